@@ -14,7 +14,7 @@ SMALL = 0.05
 #: "The same", "constant", "linear", "straight", "steady": a difference that cannot be seen on a graph, relative to its scale.
 ALIKE = 0.05
 #: Words that studies print for a visible fall: a fall by more than "the same".
-SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that is seen by the rule for *the same*"
+SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that can be seen by the rule for *the same*"
 #: Accuracy to which a place on a graph can be read: relative to the scale, and for a crank angle (deg).
 READ, READ_DEG = 0.02, 3.0
 
@@ -23,13 +23,12 @@ VERY_CLOSE_DEG, ABNORMAL = 1.0, 10.0
 
 #: The rule as the pages print it.
 RULE = (
-    "**Words of degree.** One rule holds on both pages. *About*, *approximately*, *nearly*, *almost*, *near*, *around*, *in "
-    f"the region of*, *similar*: within {100 * ABOUT:g} % of the number, or within {ABOUT_DEG:g} deg of an angle, or within "
-    "half of one where whole cycles are counted. *Slightly*, *a little*: a change by at "
-    f"most {100 * SLIGHTLY:g} %, and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what "
-    f"it is compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, "
-    f"which no one sees on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, or "
-    f"{READ_DEG:g} deg. *Very close*: within {VERY_CLOSE_DEG:g} deg. *Abnormally*: at least {ABNORMAL:g} times as much. A "
-    "printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: "
-    "the sign alone."
+    "**Words of degree.** Both pages convert these words to numbers by one rule. *About*, *approximately*, *nearly*, *almost*, "
+    f"*near*, *around*, *in the region of*, *similar*: within {100 * ABOUT:g} % of the number; for an angle within "
+    f"{ABOUT_DEG:g} deg; for a number of whole cycles within half a cycle. *Slightly*, *a little*: a change by at most "
+    f"{100 * SLIGHTLY:g} % and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what it is "
+    f"compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, a "
+    f"difference that cannot be seen on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, "
+    f"or {READ_DEG:g} deg. *Very close*: within {VERY_CLOSE_DEG:g} deg. *Abnormally*: at least {ABNORMAL:g} times as much. A "
+    "printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: only the sign decides."
 )

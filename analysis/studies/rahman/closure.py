@@ -211,7 +211,7 @@ def _settled_shares(a4: float) -> dict[float, float]:
 
 
 def _limits() -> tuple[Statement, ...]:
-    """Judge the limits of S1 and alpha4 that section 3.2 states of the iteration."""
+    """Judge the limits of S1 and alpha4 that section 3.2 states for the iteration."""
     shares = {a4: _settled_shares(a4) for a4 in (0.0, 10.0, 20.0, 30.0)}
     last = {a4: max(s1 for s1, share in settled.items() if share > 0.0) for a4, settled in shares.items()}
     always = max(s1 for s1 in shares[30.0] if all(share == 1.0 for less, share in shares[30.0].items() if less <= s1))
@@ -222,17 +222,18 @@ def _limits() -> tuple[Statement, ...]:
         while _settles_with_twist(found + way):
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
-    place, step = text("section 3.2, L1121"), "0.5 in, the step of the limits"
+    place, step = text("section 3.2, L1121"), "0.5 in, the step in which S1 is tried"
     no_offset, increased, twist = (
         Statement(
             "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
             "converge if the term [S1] is greater than 1.5 inches.",
             place,
-            f"greatest S1, by halves of an inch up to {TRIED[-1]:g}, at which the printed iteration settles at every angle in "
-            f"any of {RUNS} runs, whose starts differ by {OFF:g} (rad, in), as by rounding",
+            f"greatest S1 at which the printed iteration settles at every angle in any of {RUNS} runs. S1 is tried in steps "
+            f"of half an inch up to {TRIED[-1]:g} in. The starts of the runs differ by {OFF:g} (rad, in), as rounding errors "
+            "would make them differ",
             step,
             (near("a4 = 0", "1.5", last[0.0], 0.5, "in"),),
-            "rounding decides: of the runs settle "
+            "rounding errors decide: the share of runs that settle is "
             + ", ".join(f"{shares[0.0][s1]:.0%} at {s1:g} in" for s1 in (1.0, 1.5, 2.0)),
         ),
         Statement(
@@ -253,11 +254,11 @@ def _limits() -> tuple[Statement, ...]:
             "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
             "as offset [alpha4] is between 232 and 310 degrees.",
             place,
-            "least and greatest alpha4, by degrees, up to which the printed iteration settles at every angle; share of seven "
-            "twists, evenly from 232 to 310 deg, at which it settles",
-            "1 deg, the step of the limits; none of the share",
+            "least and greatest alpha4, in steps of 1 deg, up to which the printed iteration settles at every angle; share "
+            "of seven twists, evenly spaced from 232 to 310 deg, at which it settles",
+            "1 deg, the step of alpha4; none for the share",
             (*twists, at_least("232 to 310 deg", 1.0, within)),
-            "the loops on which it settles are open (erratum 1)",
+            "but the loops on which it settles are open (erratum 1)",
         ),
     )
     return no_offset, increased, *_mechanism_limits(), twist
@@ -276,22 +277,23 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
             "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
             "the increase of crank axial shift, offset [a4] should be increased.",
             place,
-            "change of the greatest S1 at which the crank turns fully",
+            "change of the greatest S1 at which the crank turns fully, from one offset to the next",
             "none, the sign decides",
             tuple(
                 at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
                 for before, after in pairwise(shifts)
             ),
-            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2); the limits of the thesis's iteration are not its own",
+            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2), which falls with a4. The limits that the thesis found "
+            "belong to its iteration, not to the mechanism",
         ),
         Statement(
             "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
             "from another at the joint or the slider will go to the opposite side.",
             place,
-            "least margin of the rod's reach over a turn: 1 in, our choice, beyond the greatest S1, negative where the loop "
-            "cannot close; at the greatest S1, greatest of the four, zero where the two assemblies meet, so that the slider "
-            "can go to the opposite side",
-            f"none, the sign decides; {ROUNDING}, of zero",
+            "margin of the rod's reach, the least over a turn. First with S1 larger than its greatest value by 1 in, our "
+            "choice: the margin is negative where the loop cannot close. Then at the greatest S1, the greatest margin of "
+            "the four offsets: it is zero where the two assemblies meet, so that the slider can go to the opposite side",
+            f"none, the sign decides; {ROUNDING}, for zero",
             (
                 *(
                     at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
@@ -299,7 +301,7 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
                 ),
                 nothing("a4 = 0, 10, 20, 30 in, greatest S1", [margin(*at) for at in shifts.items()], "in"),
             ),
-            "where the thesis's program fails, the mechanism does not, by the row before",
+            "but where the thesis's program fails, the mechanism does not fail (row before)",
         ),
     )
 
@@ -428,14 +430,15 @@ def _detection() -> Statement:
         "The approach is developed in such a manner that a digital computer can detect when a solution is "
         "possible and then solve the whole problem.",
         text("abstract, L45"),
-        "of the shifts at which the crank turns fully, by 2 in from 0, a4 = 0, 10, 20, 30 in, the shares at which the printed "
-        "iteration, from the planar estimate at theta1 = 0 and then from the angle before (L465), fails",
-        f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
+        "shares of shifts at which the printed iteration fails, among the shifts at which the crank turns fully, in steps "
+        "of 2 in from 0, at a4 = 0, 10, 20, 30 in. It starts from the planar estimate at theta1 = 0, and then from the "
+        "solution at the previous angle (L465)",
+        f"none for the shares; a loop is open above {NOTHING:g} rad, for rounding errors",
         (
             at_most("it does not settle at every angle", 0.0, missed),
             at_most("it settles, and a loop is open", 0.0, wrong),
         ),
-        "the iteration settles where its steps become small, which says nothing of the loop (erratum 1)",
+        "the iteration settles where its steps become small, and this does not mean that the loop is closed (erratum 1)",
     )
 
 
@@ -455,9 +458,10 @@ def _matrices() -> tuple[Statement, ...]:
             "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
             "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
             text("section 2.3, L213; eqs 1 to 4"),
-            "freedoms that the matrices of eqs 1 to 4 give each joint: rotations, the rank of the derivatives of their real "
-            "parts by its variables, in a general position; translations, what the dual parts add to this rank",
-            "none of a count",
+            "freedoms that the matrices of eqs 1 to 4 give each joint, in a general position. The rotations are the rank of "
+            "the derivatives of the matrix's real part by the joint's variables; the translations are what the dual part "
+            "adds to this rank",
+            "none, since counts are exact",
             tuple(replace(near(label, count, found, 0.0), stated=word) for label, word, count, found in joints),
             "erratum 1: eqs 2 and 3 give each ball joint two rotations",
         ),
@@ -465,17 +469,17 @@ def _matrices() -> tuple[Statement, ...]:
             "Therefore, the transformation matrix, specifying the location of coordinate frame {2} with respect to frame {1}, "
             "can be written as",
             text("section 2.4, eqs 1 to 4, L261-306"),
-            "difference of the matrices of eqs 1 to 4 from the products of the rotations and translations that the text names, "
-            "in a general position, lengths in inches",
+            "difference between the matrices of eqs 1 to 4 and the products of the rotations and translations that the text "
+            "names, in a general position, with lengths in inches",
             ROUNDING,
             (nothing("eqs 1 to 4", _matrices_error()),),
         ),
         Statement(
             "hence partial differential operator [Q_L eta_2] can be written as,",
             text("section 2.5, eqs 2a to 4a, L320-352"),
-            "difference of the operators times the matrices from difference quotients of the matrices, in a general position, "
-            "lengths relative to the rod's",
-            f"{ROUGH:g}, the error of the quotients",
+            "operators times matrices, minus difference quotients of the matrices, in a general position, with lengths "
+            "relative to the rod's length",
+            f"{ROUGH:g}, the error of the difference quotients",
             (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operator_error()),),
         ),
     )
@@ -498,16 +502,18 @@ def _step() -> tuple[Statement, ...]:
             "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
             "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
-            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing; joined in our "
-            f"way, both leave the loop open by {least:.0f} deg and more in the turn out of the plane",
+            why="the thesis prints only the Newton-Raphson half (eqs 7 to 26), and its program is missing. When we combine "
+            f"the two in our own way, the loop out of the plane stays open by {least:.0f} deg or more somewhere in the "
+            "turn",
         ),
         Statement(
             "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
             "independent.",
             text("section 2.6.1, eqs 19a, 19b, L416"),
-            "rank of the nine left sides, by eqs 12 to 16, in a general position; order, in the opening of a planar loop, of "
-            "the sums of opposite right sides, which vanish if three equations give the other six",
-            "none of a count; 2, as eq 11 neglects the second order; 0.05, as an order is a whole number",
+            "rank of the nine left sides, by eqs 12 to 16, in a general position. Then the sums of right sides on opposite "
+            "sides of the diagonal, which vanish if three equations imply the other six: the order (power) with which these "
+            "sums decrease as an open planar loop is closed",
+            "none for the rank; order 2, as eq 11 neglects the second order; 0.05, since an order is a whole number",
             (
                 replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
                 at_least("order of the sums of right sides", 1.95, order),
@@ -518,24 +524,24 @@ def _step() -> tuple[Statement, ...]:
             "closure. This constraint is included through modification of the current set of equations as discussed in Sandor "
             "and Erdman (1984).",
             text("section 2.6.1, eqs 20, 22, L429-436"),
-            "right sides of eqs 20 for a loop that is open by half a turn about i; greatest departure from unity of a diagonal "
-            "element of a loop that is open and for which the right sides of eqs 22 vanish",
+            "right sides of eqs 20 for a loop that is open by half a turn about i. Then, for an open loop for which the "
+            "right sides of eqs 22 vanish, the greatest difference of a diagonal element from unity",
             ROUNDING,
             (
                 nothing("not in eqs 20: half a turn", half_turn[_BELOW]),
                 nothing(f"in eqs 22: a loop open by {open_deg:.1f} deg", np.diag(open_22) - 1.0),
             ),
-            "eqs 22 exclude half a turn, but not every open loop",
+            "eqs 22 exclude an opening of half a turn, but not every open loop",
         ),
         Statement(
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
             "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
-            "difference of the two sides, A^-1 being what L457 gives, greatest of the first corrections of a turn; "
-            f"{OPEN[0].name}, lengths in inches",
+            "greatest difference of the two sides over the first corrections of a turn, where A^-1 means (A'A)^-1 A' as in "
+            f"L457; {OPEN[0].name}, lengths in inches",
             ROUNDING,
             (nothing("the two sides", _inverse_difference(OPEN[0])),),
-            "A is 6 x 5, so that Delta need not meet eq 23 itself",
+            "A is 6 x 5, so that Delta need not satisfy eq 23 itself",
         ),
     )
 
@@ -555,23 +561,25 @@ def _ends() -> tuple[Statement, ...]:
             "to the desired accuracy limits. At this point the displacements are determined only for the first "
             "position of the input link. ... This process is continued for a complete rotation of the input link, the crank.",
             text("section 2.6.1, L465"),
-            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn",
+            "where the printed iteration ends: rotation by which the loop is open, and error of S4, each the greatest of "
+            "the turn",
             ROUNDING,
             tuple(determined),
-            "erratum 1: small steps are no closed loop",
+            "erratum 1: small steps do not mean a closed loop",
         ),
         Statement(
             "From geometry the following formulas for the joint variables can be written.",
             text("section 2.6.2, L483-491"),
-            "rotation (rad) and length (m) by which they leave the planar loop open at theta1 = 0, a4 = 0, 10, 20, 30 in",
-            "1e-12, the rounding",
+            "rotation (rad) and length (m) by which these formulas leave the planar loop open at theta1 = 0, a4 = 0, 10, "
+            "20, 30 in",
+            "1e-12, for rounding errors",
             (at_most("open", 1e-12, _opening_of_estimates()),),
         ),
     )
 
 
 def _convergence() -> tuple[Statement, ...]:
-    """Judge what section 3.3 states of the starts, the number of iterations, and a singular matrix A."""
+    """Judge what section 3.3 states about the starts, the number of iterations, and a singular matrix A."""
     poor, fair = (-120.0, -60.0, 60.0, 120.0, 180.0), (-20.0, -10.0, 0.0, 10.0, 20.0)
     settled = {
         where: np.mean([found.settled for found in endings(cases, poor)])
@@ -591,31 +599,34 @@ def _convergence() -> tuple[Statement, ...]:
             "The main disadvantage of this method is that if we can not make good initial estimates for joint "
             "displacements, ... the method will not converge.",
             place,
-            "share of starts from which the iteration settles: planar estimates, by 30 deg of the crank, with theta2 and "
-            "theta3 off, each by 60 or 120 deg either way or by 180 deg, our choice",
-            "none of a share",
+            "share of starts from which the iteration settles. The starts are planar estimates at every 30 deg of the "
+            "crank, with theta2 and theta3 each changed by 60 or 120 deg either way or by 180 deg (our choice)",
+            "none, since the sentence makes no exception",
             tuple(at_most(where, 0.0, share) for where, share in settled.items()),
-            "it settles all the same, though not always on the loop that is sought",
+            "it settles nevertheless, though not always on the wanted loop",
         ),
         Statement(
             "Usually the process converges in 3 to 6 iterations if estimates are within 20 degrees, which is quite "
             "possible by using the direct formula for the planar case.",
             place,
-            f"share of starts from which 3 to 6 corrections reach one below {STEP:g} or {LOOSE:g} (rad, in), ours: in the "
-            "plane planar estimates at every 30 deg, theta2 and theta3 off by 0, 10 or 20 deg, out of it the angle before, if "
-            "within 20 deg; greatest error of the planar estimates at theta1 = 0",
-            "more than half, as *usually* says; 20 deg as stated",
+            f"share of starts from which 3 to 6 corrections suffice, the last of them below {STEP:g} or {LOOSE:g} (rad, in; "
+            "our choice). In the plane the starts are planar estimates at every 30 deg, with theta2 and theta3 changed by "
+            "0, 10 or 20 deg; out of the plane they are the solutions at the previous angle, if within 20 deg. Then the "
+            "greatest error of the planar estimates at theta1 = 0",
+            "more than half of the starts, as *usually* says; 20 deg as stated",
             (
                 *(at_least(label, 0.5, np.mean((steps >= 3) & (steps <= 6))) for label, steps in made.items()),
                 *(at_most(f"estimates, {full_name(case)}", "20", _estimate_error(case), "deg") for case in OUT),
             ),
-            "out of the plane the accuracy, which the thesis does not give, decides; with a twist the planar eta2 fails",
+            "out of the plane the result depends on the accuracy, which the thesis does not give. With a twist the planar "
+            "estimate of eta2 is too far off",
         ),
         Statement(
             "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
             "running the program.",
             place,
-            "least singular value of A relative to its greatest, lengths in inches, least of all corrections of a turn",
+            "least singular value of A divided by its greatest, with lengths in inches; the least over all corrections of a "
+            "turn",
             ROUNDING,
             (
                 nothing("may: a4 = 38 in, rod at right angles to the guide", _right_angle_condition()),
@@ -642,9 +653,10 @@ def closure() -> StudyResult:
     return StudyResult(
         number="rahman-closure",
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
-        assignment=f"The iteration runs round the turn by {STEP_DEG:g} deg, from the planar estimate at theta1 = 0 and then "
-        f"from the angle before. It settles where a correction is below {STEP:g} rad and {STEP:g} in, within {MAX_STEPS} "
-        "corrections: our choice, since the thesis gives neither the step, the accuracy nor the number.",
+        assignment=f"The iteration goes round the turn in steps of {STEP_DEG:g} deg. It starts from the planar estimate at "
+        "theta1 = 0, and then from the solution at the previous angle. It settles when a correction is below "
+        f"{STEP:g} rad and {STEP:g} in, within {MAX_STEPS} corrections. These numbers are our choice, since the "
+        "thesis gives neither the step, the accuracy nor the number of corrections.",
         columns=pad_columns(columns),
         statements=(_detection(), *_matrices(), *_step(), *_ends(), *_limits(), *_convergence()),
     )

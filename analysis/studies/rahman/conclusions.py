@@ -41,25 +41,26 @@ def _design() -> tuple[Statement, ...]:
             "all kinds of manufacturing tolerances, the results provide information needed for the sizing and "
             "dynamic balancing of a high speed slider crank in the design stage.",
             place,
-            f"{kinds}, of a1, a2, a4, S1, alpha4 (section 3.1); greatest relative error by the printed equations in the "
-            f"plane, a4 = 10 in, {FROM_DEAD}: of the joint forces, and of the bearing force by its part from inertia",
-            f"none of a count; {ROUNDING}",
+            "number of the dimensions a1, a2, a4, S1, alpha4 that section 3.1 varies. Then the greatest errors by the "
+            f"printed equations in the plane, a4 = 10 in, {FROM_DEAD}: of a joint force, relative to its greatest value; of "
+            "the bearing force, relative to the greatest part of it that is due to inertia",
+            f"none for a count; {ROUNDING}",
             (
                 near(kinds, 5.0, varied, 0.0),
                 nothing("for sizing, joint forces", error(right)),
                 nothing("for balancing, bearing", error({s: inertial[s] for s in ("1F1i", "1F1j")})),
             ),
-            "a1 and a2 are not varied; errata 5 and 6: with both mended the forces are right",
+            "a1 and a2 are not varied. Errata 5 and 6: with both mended, the forces are right",
         ),
         Statement(
             "This analysis can be used to determine the effect and significance of the inertia forces acting on "
             "each link due to its own mass and mass moment of inertia.",
             place,
-            "greatest error of a joint force by the printed equations in the plane, a4 = 10 in, relative to the greatest "
-            f"part of it that inertia has, {FROM_DEAD}",
+            f"greatest error of a joint force by the printed equations in the plane, a4 = 10 in, {FROM_DEAD}, relative to "
+            "the greatest part of this force that is due to inertia",
             ROUNDING,
             (nothing("as printed", error(inertial)),),
-            "errata 5 and 6: with both mended the forces are right",
+            "errata 5 and 6: with both mended, the forces are right",
         ),
         Statement(
             "It is expected that this investigation will enable designers to have better insight into the "
@@ -74,10 +75,10 @@ def conclusions() -> StudyResult:
     """Judge the statements of section 3.3 on the method as a whole."""
     ended = endings(OUT)
     cases = (
-        f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
-        "planar estimate at every 30 deg"
+        f"the {len(ended)} cases out of the plane in the figures for which the printed iteration closes the loop at every 30 "
+        "deg, starting from the planar estimate"
     )
-    all_closed = f"all of them; {ROUNDING}, of a closed loop"
+    all_closed = f"all of them; a loop is closed up to {ROUNDING}"
     closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     place = text("section 3.3, L1131")
@@ -93,7 +94,7 @@ def conclusions() -> StudyResult:
                 f"share of {cases}",
                 all_closed,
                 (at_least("cases closed", 1.0, closed),),
-                "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
+                "the planar case, in which eta2 = eta3 = 0, does not show erratum 1",
             ),
             *_design(),
             Statement(
@@ -103,7 +104,8 @@ def conclusions() -> StudyResult:
                 f"share of {cases}",
                 all_closed,
                 (at_least("cases closed", 1.0, closed),),
-                "it does not analyse its own mechanism out of the plane (erratum 1); for the computation see the next row",
+                "the method cannot analyse its own mechanism out of the plane (erratum 1); the computation is judged in the "
+                "next row",
             ),
             Statement(
                 "The main advantages of this method are its generality and that all calculations can be performed on "

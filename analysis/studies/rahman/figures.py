@@ -59,31 +59,32 @@ FloatArray = NDArray[np.float64]
 
 #: Text at the head of the figures.
 FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
-matrices, and finds from it velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Most of its
-algebra is right: the matrices and operators, the accelerations but for 38a, the momenta but for two symbols, their rates, the
-inertia forces. In the plane, with the signs of errata 5 and 6 mended, its forces agree with Newton and Euler.
+matrices. From this it finds velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Most of its
+algebra is right: the matrices and operators, the accelerations except 38a, the momenta except for two symbols, their rates, and
+the inertia forces. In the plane, its forces agree with Newton and Euler once errata 5 and 6 are mended.
 
-Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum
-1): the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps
-become small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and
-Powell's steps, joined in our way, the loops stay open as well. The limits of S1 and alpha4 within which "the program
-converges" are, but for a4 = 10 and 20 in, those of this iteration; without an offset rounding decides from 1 to 2 in. The
-mechanism works far beyond them, and its greatest shift falls with the offset, where the thesis infers that it rises. The
-axial force on the crank, which the thesis puts to zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing
-moments 1T1i and 1T1j lack a part.
+Out of the plane the method fails. A ball joint has three rotations, but eqs 2 and 3 give it two (erratum 1). The chain
+therefore has one freedom, and crank angle and shift cannot both be given. The iteration stops where its steps become small,
+on loops that are open by up to 38 deg, with the slider wrong by up to 6 in. If we add the steps of Davidon, Fletcher and
+Powell in our own way, the loops stay open too. The limits of S1 and alpha4 within which "the program converges" are limits of
+this iteration, not of the mechanism, and we find the same except at a4 = 10 and 20 in. Without an offset, rounding errors
+decide from 1 to 2 in. The mechanism works far beyond these limits. Its greatest shift falls with the offset, although the
+thesis infers that it rises. The thesis sets the axial force on the crank to zero, but this force is an unknown (erratum 7).
+Therefore 2F2k is not zero, and the printed bearing moments 1T1i and 1T1j lack a part.
 
-Of the conclusions on the engine, the displacements are almost sinusoidal, and a shift does load the bearing by two more
-moments. The offset lengthens the stroke, and saves no power. Clear of the dead centres most forces do not grow at every step
-of the offset. The spikes near 100 and 300 deg are no roundoff: they are the dead centres, where a given torque has no lever on
-the slider. Of the graphs' cases they lie within 10 deg of these angles for a4 = 20 in with alpha4 = 270 deg alone."""
+Two of the conclusions on the engine hold: the displacements are almost sinusoidal, and a shift does load the bearing with two
+more moments. Others do not: the offset lengthens the stroke and saves no power, and clear of the dead centres most forces
+do not grow at every step of the offset. The spikes near 100 and 300 deg are not roundoff. They are the dead centres, where a
+given torque has no lever arm on the slider. Among the cases of the graphs, the dead centres lie within 10 deg of these angles
+only for a4 = 20 in with alpha4 = 270 deg."""
 
 #: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
 #: Largest force or moment (lb, lb.in) that counts as zero.
 NOTHING = 1e-6
-ROUNDING = f"{NOTHING:g}, the rounding"
-#: How far from a dead centre greatest values are taken, in words.
+ROUNDING = f"{NOTHING:g}, for rounding errors"
+#: Distance from a dead centre at which greatest values are taken, in words.
 FROM_DEAD = f"{CLEAR_DEG:g} deg or more from a dead centre"
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
@@ -187,8 +188,8 @@ def _motion() -> tuple[Statement, ...]:
         Statement(
             "Slider displacement curves are almost semi-sinusoidal type of graphs which seem to be quite reasonable.",
             text("section 3.3, L1125"),
-            "greatest distance of S4 from its mean and first harmonic, relative to half the stroke, in Figs R5 to R7; "
-            "*semi-sinusoidal* is read as sinusoidal, *reasonable* is not measured",
+            "greatest distance of S4 from the sum of its mean and its first harmonic, relative to half the stroke, in Figs "
+            "R5 to R7. *Semi-sinusoidal* is read as sinusoidal; *reasonable* is not measured",
             f"{ABOUT:g}, the rule for *almost*",
             tuple(shapes),
         ),
@@ -196,18 +197,19 @@ def _motion() -> tuple[Statement, ...]:
             "When crank is placed at higher level than the plane on which slider is moving by providing positive offset "
             "distance [a4], the stroke of the engine is reduced.",
             text("section 3.3, L1125"),
-            "stroke of the cases of variable offset relative to the ideal one's",
+            "stroke of each case of variable offset, relative to the stroke of the ideal case",
             "none, the sign decides",
             tuple(strokes),
-            "the offset lengthens the stroke, at S1 = 0 as well",
+            "the offset lengthens the stroke; it does so at S1 = 0 as well",
         ),
         Statement(
             "So in that case [of a positive a4], while consuming less power the same RPM of the engine can be obtained.",
             text("section 3.3, L1125"),
-            "mean power at 50 rpm in the ideal case less the least at a4 = 10, 20, 30 in, S1 = 3.5 in",
-            f"more than {NOTHING:g} lb.in/s, the rounding",
+            "mean power at 50 rpm in the ideal case, minus the least mean power at a4 = 10, 20, 30 in with S1 = 3.5 in",
+            f"more than {NOTHING:g} lb.in/s, for rounding errors",
             tuple(saved),
-            "the torque at this speed takes the same power at any offset, a load more by the longer stroke",
+            "at this speed the given torque takes the same power at any offset; a given load takes more, because the stroke "
+            "is longer",
         ),
     )
 
@@ -241,22 +243,24 @@ def _forces() -> tuple[Statement, ...]:
         Statement(
             "But with the increase of offset distance [a4], joint forces and torques also increase.",
             text("section 3.3, L1125"),
-            "least gain, from one case to the next, of the greatest magnitude of each of the eleven components in the graphs: "
-            f"the ideal case and a4 = 10, 20, 30 in with S1 = 3.5 in, {FROM_DEAD}, our choice",
+            "change of a component's greatest magnitude from each case to the next: the ideal case, then a4 = 10, 20, 30 in "
+            f"with S1 = 3.5 in. The magnitude is taken {FROM_DEAD}, our choice. For each of the eleven components in the "
+            "graphs, the least of the three changes is listed",
             "none, the sign decides",
             tuple(gains),
-            "the others fall at a step; with 3, 5, 15, 20 or 30 deg two or three grow",
+            "the other components decrease at one step at least. If the distance from the dead centres is 3, 5, 15, 20 or "
+            "30 deg instead, two or three components increase",
         ),
         Statement(
             "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
             "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
             text("section 3.3, L1125"),
-            "poles (spikes) of each component in a turn, in the nine cases beside the ideal one where it does not vanish, the "
-            "count that differs most from the stated one; greatest distance of their dead centres, where the poles lie, from "
-            "100 and 300 deg",
-            f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*",
+            "number of poles (spikes) of each component in a turn, in the nine cases beside the ideal one, except where the "
+            "component vanishes; the number that differs most from the stated one is listed. Then, for each case, the "
+            "greatest distance of its dead centres, where the poles lie, from 100 and 300 deg",
+            f"none for a number of spikes; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
-            "3F3k is finite at both dead centres, 4F4k at none; the offset and the twist move them",
+            "3F3k is finite at both dead centres, and 4F4k at neither. The offset and the twist move the dead centres",
         ),
         Statement(
             "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "
@@ -268,7 +272,7 @@ def _forces() -> tuple[Statement, ...]:
 
 
 def _bearing_moments() -> tuple[Statement, ...]:
-    """Judge whether the shift causes the moments 1T1i and 1T1j, and their expressions by the forces on the crank."""
+    """Judge whether the shift causes the moments 1T1i and 1T1j, and how they follow from the forces on the crank."""
     cases = (IDEAL, *ALL)
     moments = {symbol: {case: values(case, COMPONENTS[symbol]) for case in cases} for symbol in ("1T1i", "1T1j")}
     shifted = [case for case in ALL if case.shift_in]
@@ -303,7 +307,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
         Statement(
             "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint [1].",
             text("section 3.3, L1125-1127"),
-            f"greatest magnitude {FROM_DEAD}, least of the six cases with a shift",
+            f"greatest magnitude {FROM_DEAD}, in each of the six cases with a shift; the least of the six is listed",
             f"more than {ROUNDING}",
             tuple(extra),
         ),
@@ -317,19 +321,19 @@ def _bearing_moments() -> tuple[Statement, ...]:
             "Two torque components at joint [1], i.e. [1T1i] and [1T1j] reduce to zero, when there is no crank axial offset "
             "[S1].",
             text("section 3.2, L1119"),
-            f"greatest magnitude in the ideal case and at S1 = 0, a4 = 20 in, {FROM_DEAD}",
+            f"greatest magnitude {FROM_DEAD}, in the ideal case and in the three cases with S1 = 0, a4 = 20 in",
             ROUNDING,
             tuple(none),
-            "with a twist the axial force 1F1k has a lever about the bearing",
+            "with a twist, the axial force 1F1k has a lever arm about the bearing",
         ),
         Statement(
             "By manual manipulation it is found that [1T1i = -1F1j S1] and [1T1j = 1F1i S1].",
             text("section 3.2, L1119"),
-            "difference of the two sides: by the printed 69p and 69q, in a general position at a constant shift; by the right "
-            f"forces, the most of the six cases with a shift, {FROM_DEAD}",
+            "difference of the two sides of each equation: first by the printed eqs 69p and 69q, in a general position at a "
+            f"constant shift; then by the right forces, the greatest of the six cases with a shift, {FROM_DEAD}",
             ROUNDING,
             (*by_hand, *by_forces),
-            "the thesis puts 1F1k to zero; the right 1F1k (erratum 7) adds to both moments",
+            "the thesis sets 1F1k to zero, but the right 1F1k (erratum 7) adds to both moments",
         ),
     )
 
@@ -372,29 +376,31 @@ def _constant() -> tuple[Statement, ...]:
             "Axial force [1F1k] acts on the crank at joint 1 and equals mass of the crank times its axial acceleration, and "
             "torque [1T1k] is applied constantly.",
             text("section 2.8, L945"),
-            f"greatest difference of the axial force from m1 S1'', {FROM_DEAD}, in the nine cases of constant shift "
-            "and with a shift by eq 28, amplitude and alpha ours",
+            f"greatest difference of the axial force from m1 S1'', {FROM_DEAD}: in the nine cases of constant shift, and "
+            "with a sinusoidal shift by eq 28 of which amplitude and alpha are our choice",
             ROUNDING,
             (
                 *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),
                 nothing("a4 = 10 in, sinusoidal shift of 3.5 in, alpha = 1", sinusoidal_axial_force(), "lb"),
             ),
-            "erratum 7: S1 is given, so that its force is an unknown; the constant torque is an assumption, not judged",
+            "erratum 7: S1 is given, so that the axial force is an unknown. The constant torque is an assumption, which is "
+            "not judged",
         ),
         Statement(
             "There are sixteen unknowns, including both forces and torques and seventeen equations. Although one equation is "
             "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
             "possible, because small sine or cosine terms in the denominator sometimes results in inaccurate division.",
             text("section 2.8, L961"),
-            "unknown components of the joint forces and moments, 1F1k among them (erratum 7); eqs 62a to 64f without 63b, 62c "
-            "mended, and their rank in these unknowns in a general position, 16 if one is redundant",
-            "none of a count",
+            "number of unknown components of the joint forces and moments, including 1F1k (erratum 7); number of eqs 62a to "
+            "64f without 63b and with 62c mended; their rank in these unknowns in a general position, which is 16 if one "
+            "equation is redundant",
+            "none, since counts are exact",
             (
                 replace(near("unknowns", 16.0, len(COMPONENTS) - 1, 0.0), stated="sixteen"),
                 replace(near("equations", 17.0, len(equations), 0.0), stated="seventeen"),
                 near("rank", 16.0, np.linalg.matrix_rank(equations), 0.0),
             ),
-            "no equation is redundant; what the sentence says of sines and cosines is not measured",
+            "no equation is redundant. The remark on sines and cosines is not measured",
         ),
     )
 
@@ -448,14 +454,14 @@ def compute(number: str) -> StudyResult:
     for component in components:
         columns |= {_curve_name(component.symbol, case, component.unit): values(case, component) for case in cases}
     columns |= {_dead_centre_name(case): dead_centres_deg(case) for case in cases}
-    shown = ", ".join(symbols) or "displacement S4"
+    shown = ", ".join(symbols) or "Slider displacement S4"
     if number == CONSTANT:
         claim = (
-            "Rahman states: 1F1k and 2F2k are zero, 2F2j is -T/a1, the moments on the slider are zero, in every case and at "
-            "every angle."
+            "Rahman states: in every case and at every angle, 1F1k and 2F2k are zero, 2F2j is -T/a1, and the moments on the "
+            "slider are zero."
         )
     else:
-        claim = f"The {shown} over a turn of the crank for variable {family}, beside the ideal case."
+        claim = f"{shown} over a turn of the crank for variable {family}, beside the ideal case."
     assignment = "" if number == CONSTANT else INFERRED
     return StudyResult(
         number=number,

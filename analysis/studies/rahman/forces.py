@@ -78,7 +78,7 @@ from .table import COMPONENTS, Case
 #: Distance g3 (in) at which the terms of the slider's moment of mass count; the thesis computes with 0.
 G3 = 2.0
 #: Why the two paths give different momenta.
-PATHS = "errata 3, 4: out of the plane the velocities of the two paths differ"
+PATHS = "errata 3, 4: out of the plane the two paths give different velocities"
 #: Weight of water (lb/in3), the reference of specific gravities.
 WATER = 62.43 / 12.0**3
 #: Components of the joint forces in the plane.
@@ -229,8 +229,8 @@ def _momenta() -> tuple[Statement, ...]:
             "respectively be obtained by modifying equations (49), (50) and (51) to 3\N{MULTIPLICATION SIGN}1 "
             "dual-number matrix equations as shown below",
             text("section 2.8, eqs 49a to 51a, L700-728"),
-            "difference from the binors of eqs 46 to 48 times the velocities of eqs 33, 35 and 45, in a general position with "
-            f"unequal radii of gyration, S1' = 1.3 in/s and g3 = {G3:g} in",
+            "difference from the binors (inertia operators) of eqs 46 to 48 times the velocities of eqs 33, 35 and 45, in a "
+            f"general position with unequal radii of gyration, S1' = 1.3 in/s and g3 = {G3:g} in",
             ROUNDING,
             (
                 nothing("eq 49a", difference(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
@@ -247,8 +247,8 @@ def _momenta() -> tuple[Statement, ...]:
         Statement(
             "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
             text("section 2.8, eqs 52a, 53a, L744-748"),
-            f"difference from the binors times the velocities of eqs 36 and 32a, in a general position; g3 = {G3:g} in in 53a, "
-            "and 0 in 52a (L1089)",
+            f"difference from the binors times the velocities of eqs 36 and 32a, in a general position with g3 = {G3:g} in "
+            "in 53a and 0 in 52a (L1089)",
             ROUNDING,
             (
                 nothing("eq 52a", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
@@ -261,12 +261,13 @@ def _momenta() -> tuple[Statement, ...]:
             "obtained, but mixed path equations set is much simpler than only the forward path equations set. ... Both the "
             "sets were tested by the program for a number of cases and resulted in same outcome.",
             text("section 2.8, L637-639, L750"),
-            "greatest difference of the force parts of the momenta of rod and slider by eqs 50a and 51a from those by eqs 52a "
-            f"and 53a, erratum 9 mended, where the printed iteration ends, by {STEP_DEG:g} deg of the turn, with theta2 over "
-            f"{ABOUT_DEG:g} deg from 0 and half a turn, our choice",
+            "greatest difference between the momenta of rod and slider (force parts) by eqs 50a and 51a and those by eqs "
+            "52a and 53a, with erratum 9 mended, where the printed iteration ends. The turn is sampled at every "
+            f"{STEP_DEG:g} deg; angles where theta2 is within {ABOUT_DEG:g} deg of 0 or of half a turn are left out (our "
+            "choice)",
             ROUNDING,
             tuple(velocity_paths()),
-            f"{PATHS}; *much simpler* is not measured",
+            f"{PATHS}. *Much simpler* is not measured",
         ),
     )
 
@@ -297,8 +298,8 @@ def _momentum_rates() -> tuple[Statement, ...]:
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
             "equations are obtained respectively:",
             text("section 2.8, eqs 54 to 56, L754-846"),
-            f"difference from the rates of eqs 49a to 51a, erratum 9 mended, in a general position {AT_RATES}, g3 = {G3:g} in; "
-            f"{DOTS}, and missing brackets are added",
+            f"difference from the rates of eqs 49a to 51a, with erratum 9 mended, in a general position {AT_RATES} and g3 = "
+            f"{G3:g} in; {DOTS}, and missing brackets are added",
             ROUNDING,
             tuple(nothing(label, difference(found, _rate(h)), "lb") for label, (found, h) in forward.items()),
         ),
@@ -306,9 +307,9 @@ def _momentum_rates() -> tuple[Statement, ...]:
             "Now, backward path equations (52a) and (53a) are differentiated with respect to time. The following "
             "equations are replacements for equations (55) and (56) respectively.",
             text("section 2.8, eqs 57, 58, L848-857"),
-            f"difference from the rates of eqs 52a, erratum 9 mended, and 53a in a general position {AT_RATES}, g3 = 0; "
-            "greatest difference of the force parts of 57 from 55 and of 58 from 56, where the momenta of the two paths are "
-            f"compared above; {DOTS}",
+            "difference of eqs 57 and 58 from the rates of eqs 52a (erratum 9 mended) and 53a, in a general position "
+            f"{AT_RATES} and g3 = 0. Then the greatest difference of the force parts of 57 from 55 and of 58 from 56, at the "
+            f"angles at which the row on the two paths compares the momenta; {DOTS}",
             ROUNDING,
             (*(nothing(label, difference(found, _rate(h)), "lb") for label, found, h in backward), *replacements()),
             PATHS,
@@ -316,11 +317,12 @@ def _momentum_rates() -> tuple[Statement, ...]:
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
-            "greatest roundoff of the momenta, single precision less double, over a turn by half degrees: by 52a and 53a over "
-            "that by 50a and 51a; components that have any by one of them; in the plane, a4 = 10 in",
+            "greatest roundoff over a turn, at every half degree, of each component of the momenta in the plane, a4 = 10 "
+            "in: its value in single precision minus that in double precision. The roundoff by 52a and 53a is divided by "
+            "that by 50a and 51a; components without roundoff by either are left out",
             "none, the sign decides",
             tuple(_roundoffs()),
-            "component i of the rod takes the roundoff of S4' by 52a besides",
+            "for component i of the rod, 52a has the roundoff of S4' in addition",
         ),
     )
 
@@ -343,11 +345,11 @@ def _inertia() -> tuple[Statement, ...]:
             "link 2 (i.e. the connecting rod) relative to frame {3} and for link 3 (i.e. the slider) relative to "
             "frame {4} are derived.",
             text("section 2.8, eqs 59 to 61, L863-881"),
-            f"difference from the rate of momentum in a frame at rest, by the binors, in a general position {AT_RATES}, "
-            "g3 = 0, by 52a with g2 for g3",
+            "difference from the rate of change of the momentum in a frame at rest, computed with the binors, in a general "
+            f"position {AT_RATES} and g3 = 0; eq 52a has g2 in place of g3",
             ROUNDING,
             tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
-            "their sign is judged in the next row",
+            "the sign of these forces is judged in the next row",
         ),
         Statement(
             "The force equations for links 1, 2 and 3 are respectively as follows:",
@@ -422,8 +424,8 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "Expanding equations (62), (63), (64) and separating primary and dual parts, the following equations are "
             "obtained:",
             text("section 2.8, eqs 62a to 64f, L907-943"),
-            "difference from eqs 62 to 64 with the matrices of eqs 1 to 3, any forces and moments in a general position, "
-            "lengths in inches",
+            "difference from eqs 62 to 64, evaluated with the matrices of eqs 1 to 3 for arbitrary forces and moments in a "
+            "general position, lengths in inches",
             ROUNDING,
             tuple(nothing(words, size, "lb") for words, size in _expansion_differences().items()),
             f"erratum 9: 1F1j for 1F1i in 62c, {MAYBE}",
@@ -432,16 +434,16 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "There are eighteen equations out of which one does not give any solution (equation (63b)), since it is "
             "of the form 0=0; confirmation of this was done by evaluating it in the computer program.",
             text("section 2.8, eq 63b, L923, L945"),
-            "f2xd by eqs 52a, with g2 for g3 (erratum 9), 57 and 60 in a general position with K2y = K2z (L1105)",
+            "f2xd by eqs 52a (with g2 for g3, erratum 9), 57 and 60, in a general position with K2y = K2z (L1105)",
             ROUNDING,
             (nothing("f2xd", general["f2xd"], "lb.in"),),
-            "were they unequal, it would not be 0",
+            "if K2y and K2z were unequal, it would not be 0",
         ),
         Statement(
             "The details of the solution procedure are as follows:",
             text("section 2.8, eqs 69a to 69q, L961-1033"),
-            "greatest residual of eqs 62a to 64f, 62c mended, with the forces by eqs 69a to 69q in a general position, inertia "
-            "forces as printed but for g2 in 52a, 1F1k = 0",
+            "greatest residual of eqs 62a to 64f, with 62c mended, for the forces by eqs 69a to 69q in a general position "
+            "with 1F1k = 0. The inertia forces are as printed, except for g2 in 52a",
             ROUNDING,
             (
                 nothing("eqs 62a to 62f", unsolved[0], "lb"),
@@ -450,7 +452,7 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
                 nothing("eq 63e", unmet[1], "lb"),
                 nothing("eqs 64a to 64f", unsolved[2], "lb"),
             ),
-            "erratum 7: 69c meets the difference of 63d and 63e alone; both need the right 1F1k",
+            "erratum 7: 69c satisfies only the difference of 63d and 63e; to satisfy both, the right 1F1k is needed",
         ),
     )
 
@@ -475,11 +477,11 @@ def _slider_force(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "
             "very close to zero, while running the program.",
             text("section 2.8, eq 69h, L995"),
-            f"greatest 2F2i by eq 69h, at half degrees of the crank, where theta2 is within {VERY_CLOSE_DEG:g} deg of 0, "
-            f"relative to that {FROM_DEAD}; in the plane, a4 = 10 in, errata 5 and 6 mended",
+            f"greatest 2F2i by eq 69h at the half degrees of the crank at which theta2 is within {VERY_CLOSE_DEG:g} deg of "
+            f"0, relative to the greatest {FROM_DEAD}; in the plane, a4 = 10 in, with errata 5 and 6 mended",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*",
             (at_least("2F2i", ABNORMAL, high),),
-            "the outcome is right: the force that a torque calls forth is infinite there",
+            "but this outcome is right: the force that a given torque causes is infinite there",
         ),
         Statement(
             "If that value [of 2F2i by eq 69h] is incorrect, equation (62a) involving with the terms [1F1i], [1F1j] and [2F2i] "
@@ -496,10 +498,11 @@ def _slider_force(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "equation (69k), using previously found values of the terms [1F1i] and [1F1j] from the equations (69i) and (69j) "
             "respectively.",
             text("section 2.8, L1007-1009"),
-            f"error of 2F2i after ten passes of eqs 69i, 69j, 69k from an error of 1 lb; in the plane, a4 = 10 in, {FROM_DEAD}",
+            "error of 2F2i after ten passes through eqs 69i, 69j and 69k that start from an error of 1 lb; in the plane, a4 "
+            f"= 10 in, {FROM_DEAD}",
             ROUNDING,
             (nothing("2F2i", left, "lb"),),
-            "erratum 8: 69k gives back the 2F2i that is put in",
+            "erratum 8: 69k returns the 2F2i that is put in",
         ),
     )
 
@@ -512,26 +515,26 @@ def _by_hand(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
         Statement(
             "Interestingly, by manual manipulation of the equation those components [4T4 and 2F2k] are also found to be zero.",
             text("section 3.2, L1117"),
-            "by the printed equations in a general position, g3 = 0 (L1089)",
+            "values by the printed equations in a general position, with g3 = 0 (L1089)",
             ROUNDING,
             tuple(
                 nothing(symbol, general[symbol], "lb.in" if "T" in symbol else "lb")
                 for symbol in ("4T4i", "4T4j", "4T4k", "2F2k")
             ),
-            "4T4j is zero because g3 is, 2F2k because the equations put 1F1k to zero (erratum 7)",
+            "4T4j is zero because g3 is zero; 2F2k is zero because the equations set 1F1k to zero (erratum 7)",
         ),
         Statement(
             "By manual manipulation that force component [2F2j] is found to be negative of the ratio of input torque (100 "
             "lb-in) and the crank length (12 inches).",
             text("section 3.2, L1119; eq 69g, L989"),
-            "2F2j by eq 69g plus T/a1 in a general position",
+            "sum of 2F2j by eq 69g and T/a1, in a general position",
             ROUNDING,
             (nothing("2F2j + T/a1", general["2F2j"] + TORQUE / CRANK, "lb"),),
         ),
         Statement(
             "Specific gravity of the material (mild steel is used for all the links) d = 0.28,",
             text("section 3.1, L1071"),
-            "mass of a crank of that specific gravity, water weighing 62.43 lb/ft3, less m1, relative to m1",
+            "mass of a crank of that specific gravity (water weighs 62.43 lb/ft3) minus m1, relative to m1",
             ROUNDING,
             (nothing("m1", gravity - 1.0),),
             "erratum 9: 0.28 is the weight density in lb/in3",
@@ -589,7 +592,7 @@ def forces() -> StudyResult:
                 f"{worst}, by the printed equations with erratum 5 mended",
                 ROUNDING,
                 (nothing("joint forces", wrong["erratum 5 mended"], "lb"),),
-                "erratum 6: from the distal joints (L601) both are negative along i; as lengths they are right",
+                "erratum 6: measured from the distal joints (L601), both are negative along i; as lengths they are right",
             ),
             *_expansion(general),
             *_slider_force(mended),

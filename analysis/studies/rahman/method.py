@@ -39,9 +39,9 @@ CLEAR_SINE = float(np.sin(np.radians(ABOUT_DEG)))
 #: Motion in which second rates are judged: the crank accelerates (rad/s2), the shift has a rate (in/s) and accelerates (in/s2).
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
-DOTS = "second rates with one dot in our scan are read with two"
-#: Words on a slip of one character.
-MAYBE = "so in our scan; the print may be right"
+DOTS = "second derivatives that have one dot in our scan are read with two"
+#: Remark on an error of one character, which may be our scan's.
+MAYBE = "at least in our scan; the printed thesis may be right"
 #: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
 
@@ -82,7 +82,7 @@ def difference(a: Dual, b: Dual) -> float:
 
 #: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "opening of the loop", "[lb]": "4F4k"}
-#: Columns drawn dashed, over the others.
+#: Words in the names of the columns that are drawn dashed, over the others.
 _DASHED = ("loop mended", "both mended", "Davidon")
 
 

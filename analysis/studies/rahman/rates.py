@@ -101,11 +101,11 @@ def _frame_velocities() -> tuple[Statement, ...]:
             "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
             "respectively.",
             text("section 2.7, eqs 30, 31, L503-509"),
-            "angular velocity by eq 30, whose form eq 31 has, less that of the matrix Z(theta) Y(eta) of eq 2, at theta = "
-            "0.8, eta = 0.3 rad, with rates of 1.7 and -2.1 rad/s",
+            "angular velocity by eq 30 (eq 31 has the same form) minus that of the matrix Z(theta) Y(eta) of eq 2, at theta "
+            "= 0.8 rad, eta = 0.3 rad, with rates of 1.7 and -2.1 rad/s",
             ROUNDING,
             (nothing("angular velocity", _angular_velocity(), "rad/s"),),
-            "erratum 2: eta turns about the axis j that theta has turned",
+            "erratum 2: eta turns about the axis j after theta has turned this axis",
         ),
         Statement(
             "The dual velocity of point 3 on the connecting rod relative to the frame in terms of the unit vectors of the "
@@ -139,19 +139,20 @@ def _solved() -> tuple[Statement, ...]:
             "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
             "matrices must be equal to some column matrix as shown below:",
             text("section 2.7, eq 38, L559-561"),
-            "coefficients and right side of eq 38 less those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
+            "coefficients and right side of eq 38 minus those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
             ROUNDING,
             (
                 nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
                 nothing("right side of row 6", eq_38[5, 5], "in/s"),
             ),
-            f"erratum 9: sin theta2 lacks sin eta2, {method.MAYBE}",
+            f"erratum 9: sin theta2 lacks the factor sin eta2, {method.MAYBE}",
         ),
         Statement(
             "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
             text("section 2.7, L563"),
-            "ranks of eqs 37a to 37f in a general position with S1' = 1.3 in/s; a solution needs equal ones",
-            "none of a count",
+            "rank of the coefficients of eqs 37a to 37f without and with the right side, in a general position with S1' = "
+            "1.3 in/s; a solution exists only if the two ranks are equal",
+            "none, since counts are exact",
             (
                 near("coefficients", "5", np.linalg.matrix_rank(matrix), 0.0),
                 near(
@@ -161,7 +162,7 @@ def _solved() -> tuple[Statement, ...]:
                     0.0,
                 ),
             ),
-            "erratum 3: six equations for five unknowns, of which five are solved",
+            "erratum 3: there are six equations for five unknowns, and only five of them are solved",
         ),
         Statement(
             "The final solutions for all the unknowns are as follows:",
@@ -201,8 +202,8 @@ def _derivatives() -> tuple[Statement, ...]:
         Statement(
             "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
             text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
-            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, at the values of the row before, with a crank "
-            "acceleration of 3 rad/s2",
+            "S1'' by eq 28b minus the rate of eq 28a with its amplitude mended, at the values of the row before, with a "
+            "crank acceleration of 3 rad/s2",
             ROUNDING,
             (nothing("eq 28b", of_28b, "in/s2"),),
         ),
@@ -313,16 +314,16 @@ def _denominators() -> Statement:
         "not free from sine terms which become very very close to zero at some particular positions of the "
         "crank, i.e. near 100 degrees and 300 degrees.",
         text("section 3.2, L1115"),
-        "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at which "
-        "sin theta2, which divides in 40a and 41a, vanishes in the plane; least distance of theta3, whose sine divides in all "
-        "five, from 0 or half a turn, over the whole turn in the plane",
-        f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+        "number of sines and cosines in the denominators of the equations printed as 69a to 69g and 69i to 69q. Then, in "
+        "the plane, the crank angles at which sin theta2, a divisor in 40a and 41a, vanishes. Then the least distance of "
+        "theta3, whose sine is a divisor in all five, from 0 or half a turn, over the whole turn in the plane",
+        f"none for a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
         (
             near("sines and cosines in denominators", 0.0, 0, 0.0),
             *zeros,
             at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(np.abs(sines).min())), "deg"),
         ),
-        "theta2 is 0 or half a turn at the dead centres, which the offset moves",
+        "theta2 is 0 or half a turn at the dead centres, and the offset moves the dead centres",
     )
 
 
@@ -339,17 +340,18 @@ def _abnormal() -> Statement:
         "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
         "the computer calculations, which is clearly inaccurate.",
         text("section 3.2, L1115"),
-        f"{full_name(case)}, where the printed iteration ends: theta2 where its sine vanishes; greatest accelerations within "
-        f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere, by half degrees and {BESIDE_DEG:g} deg, our choice, "
-        "beside these places; greatest share of them, by half degrees, that is roundoff in double precision",
-        f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
-        "for *on account of*",
+        f"{full_name(case)}, where the printed iteration ends. First theta2 at the angles where its sine vanishes. Then the "
+        f"greatest acceleration within {ABOUT_DEG:g} deg of a dead centre relative to the greatest elsewhere, at every half "
+        f"degree and {BESIDE_DEG:g} deg, our choice, beside those angles. Last the greatest share of an acceleration, at "
+        "every half degree, that is roundoff in double precision",
+        f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; a share of one "
+        "half, for *on account of*",
         (
             *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
             *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
             at_least("share that is roundoff", 0.5, _roundoff(method.joints(unknowns))),
         ),
-        "38a, 40a and 41a are unbounded, as eq 41 divides by sin theta2; roundoff does not decide",
+        "38a, 40a and 41a are unbounded because eq 41 divides by sin theta2; roundoff is not the cause",
     )
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 INFERRED = (
     "The thesis gives the family of each figure (section 3.2, L1111-1113) and, where a caption is left, whether it is of a "
-    "displacement, a force or a torque. Which component has which number is our inference, by the order of section 3.2."
+    "displacement, a force or a torque. Which component each figure shows is our inference from the order of section 3.2."
 )
 
 #: Crank angles of the spikes in sections 3.2 and 3.3 (deg).

@@ -37,28 +37,30 @@ from .runs import (
 )
 
 FINDINGS = """\
-**Claims.** Chapter II and section 3.1 write the mechanism with Lagrange's multipliers, say that these are the pin
-forces, and advise to integrate all second derivatives, so that the closure of the loop checks the integration.
-Sections 3.2 and 3.3 run Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
+**Claims.** Chapter II and section 3.1 write the equations of motion with Lagrange's multipliers, state that these are the pin
+forces, and advise integrating all second derivatives, so that the closure of the loop checks the integration.
+Sections 3.2 and 3.3 compute the linkage of Table 3.1: without a spring, with three springs, launched by a torque, and in free
+motion.
 
-**What stands.** The equations (3.8) and (3.10) are right, but for a minus that our scan lacks; the multipliers are the
-force at C and the crank torque; and at constant speed the failure of closure does tell the error, being some five to
-fifteen times that of the slider; in a launch, with short steps, it is far less than the error. The program of appendix
-1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The torque reverses near 0
-deg and hardly depends on the spring; the rise of the speed along a line in a launch, the decay by the damper, the phase
+**What stands.** The equations (3.8) and (3.10) are right, except for a minus that our scan lacks. The multipliers are the
+force at C and the crank torque. At constant speed the failure of closure does show the error of the integration: it is some
+five to fifteen times the slider's error. In a launch with short steps it is far smaller than the error. The program of
+appendix 1 prints the closure but integrates the slider alone, so that its own check shows nothing. The torque reverses
+near 0 deg and hardly depends on the spring. The linear rise of the speed in a launch, the decay by the damper, the phase
 planes, and half the natural frequency near 27 rad/s are as described.
 
-**What does not.** Without a spring the slider does not drift along a line: the mean of the inertia forces pushes it
-towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight;
-with these there is no transient to be seen, and with the others the motion never gets steady. Gravity holds the drift
-back: without it, M is with these two greater by a quarter in size, and so not slightly reduced. With the softer springs
-the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises in the
-mean 1.6 times as steeply as with the softest, and the inertia force is greater than the spring's; a spring stiffer
-still does not make the slope constant. The torque varies with the spring at its least value, but not because the
-slider's accelerations differ: they make 3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is
-nearly constant. After the weakest launch the slider swings to both sides of its start. The second harmonic, relative to
-the first, goes on growing from 27 down to 22 rad/s, and is no effect non-linear in u: the equation linear in u has it
-too. And not every predictor-corrector method is stable: Milne's classical one is weakly unstable."""
+**What does not.** Without a spring the slider does not drift along a line. The mean of the inertia forces pushes it towards
+the crank, the more strongly the nearer it comes, so that ten turns look straight only with the two strongest dampers. With
+these two no transient can be seen; with the others the motion never gets steady. Gravity holds the drift back: without it,
+the size of M with these two dampers is greater by a quarter, so that M is not slightly reduced. With the softer springs the
+transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, the mean slope of u
+is 1.6 times that with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the
+slope constant. The least value of the torque does vary with the spring, but not because the slider's accelerations differ:
+they make 3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest
+launch the slider moves to both sides of its start. The second harmonic relative to the first goes on growing from 27 down
+to 22 rad/s. It is not an effect non-linear in u, since the equation linear in u has it too. Finally, not every
+predictor-corrector method is stable: Milne's classical one is weakly unstable.
+"""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
@@ -192,7 +194,7 @@ def drift(damping: float, gravity: float = 9.81) -> Drift:
 def drift_result() -> StudyResult:
     """Compute the drift with each of the five dampers, its distance from a straight line, and when links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
-    accelerates = "the drift accelerates, and the swing about it grows"
+    accelerates = "the drift accelerates, and the oscillation about it grows"
     none = at_least(
         f"{_mu(DAMPINGS[0])}, cycles until collinear",
         FEWEST_TURNS,
@@ -208,40 +210,44 @@ def drift_result() -> StudyResult:
         for weak, strong in zip(folds, list(folds)[1:])
     ]
     (rate, start), (other_rate, other_start) = runs[5e5].line, runs[1e6].line
-    collinear = f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.0f} deg of a line, ours"
+    collinear = f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.0f} deg of a straight line (our choice)"
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
     columns |= {f"slider position u; {_mu(mu)} [cm]": run.until_collinear for mu, run in runs.items()}
     return StudyResult(
         number="3.2",
-        claim="Without a spring the slider has a transient of two turns, then a steady motion about a linear drift; "
-        "the weaker the damper, the sooner the links come collinear.",
+        claim="Without a spring the slider has a transient of two turns, then a steady motion about a linear drift. The "
+        "weaker the damper, the sooner the links become collinear.",
         columns=pad_columns(columns),
         statements=(
             Statement(
                 "The first of these is a transient region of duration approximately two cycles.",
                 text("3.2.1, L1905-1907"),
-                "cycles before the first whose motion, less the line from end to end of the cycle, changes to the next by at "
-                f"most {ALIKE:g} of its range, the rule for *steady*; if there is none, until {collinear}",
+                f"number of cycles before the first steady one or, if there is none, until {collinear}. In a steady cycle "
+                f"the motion, minus the line from end to end of the cycle, changes to the next cycle by at most {ALIKE:g} of "
+                "its range, the rule for *steady*",
                 "half a cycle, the rule where whole cycles are counted",
                 tuple(near(_mu(mu), "2", run.transient, unit="cycles") for mu, run in runs.items()),
-                "with the two strongest dampers the first cycle is already like the second, with the others it never gets "
-                "steady",
+                "with the two strongest dampers the first cycle is already like the second; with the others the motion "
+                "never gets steady",
             ),
             Statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
-                "greatest change from a cycle to the next, relative to its range, of the motion less the line from end to end "
-                f"of the cycle; cycles 3 to {DRAWN_TURNS}, ours, or until the links are collinear as in the row before",
-                f"{ALIKE_WORDS}; {FEWEST_TURNS} cycles, two of the transient and two to compare",
+                "greatest change of the motion from one cycle to the next, relative to its range, after the line from end "
+                f"to end of each cycle is subtracted. Cycles 3 to {DRAWN_TURNS} (our choice), or until the links are "
+                "collinear as in the row before",
+                f"{ALIKE_WORDS}; {FEWEST_TURNS} cycles, two for the transient and two to compare",
                 (none, *shapes),
             ),
             Statement(
                 "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0] where [M] and "
                 "[u0] are constants depending on [mu].",
                 text("3.2.1, L1911-1917"),
-                f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS}, ours, or until the links "
-                f"are collinear, from their best line, relative to the drift; fall in size of M and u0 from {_mu(5e5)} to 1e6",
-                f"{ALIKE_WORDS}; *depending* by more than that; {FEWEST_TURNS} cycles, two of the transient and two for a line",
+                f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} (our choice), or until the "
+                "links are collinear, from the best line through these points, relative to the drift. Then the relative "
+                f"decrease in size of M and u0 from {_mu(5e5)} to 1e6",
+                f"{ALIKE_WORDS}; *depending* means by more than that; {FEWEST_TURNS} cycles, two for the transient and two "
+                "for a line",
                 (
                     none,
                     *bends,
@@ -253,7 +259,7 @@ def drift_result() -> StudyResult:
                 "This indicates that for a small viscous force the linkage tends to collapse quickly into a collinear "
                 "configuration. However, as the viscous force is increased this tendency is counteracted.",
                 text("3.2.1, L1917-1925"),
-                f"cycles until {collinear}, relative to those with the next stronger damper",
+                f"number of cycles until {collinear}, relative to the number with the next stronger damper",
                 f"{SIGN}; *quickly* is read as sooner than with the next stronger damper",
                 tuple(sooner),
             ),
@@ -270,20 +276,20 @@ def weightless_result() -> StudyResult:
     ratios = {mu: drift(mu, 0.0).rate / drift(mu).rate for mu in NEAR_LINEAR}
     return StudyResult(
         number="3.3",
-        claim="Without gravity M, the rate of the drift, is slightly reduced.",
+        claim="Without gravity the rate M of the drift is slightly reduced.",
         columns=pad_columns(columns),
         statements=(
             Statement(
                 "It is clear from this figure that because the gravitational forces are eliminated the value of M in "
                 "equation (3.9) is slightly reduced.",
                 text("3.2.1, L1928-1932"),
-                f"M from the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} without gravity relative to that with it, for "
-                "the two dampers with which the drift is nearly linear",
+                f"M from the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} without gravity, relative to M with gravity, "
+                "for the two dampers with which the drift is nearly linear",
                 f"from {1 - SLIGHTLY:g} to {1 - ALIKE:g}, the rule for *slightly*",
                 tuple(
                     Case(label=_mu(mu), computed=x, lower=1.0 - SLIGHTLY, upper=1.0 - ALIKE) for mu, x in ratios.items()
                 ),
-                "M is negative, and its size grows by a quarter: with its sign it is reduced, but not slightly",
+                "M is negative, and its size grows by a quarter. With its sign it is reduced, but not slightly",
             ),
         ),
     )
@@ -350,8 +356,8 @@ def steady_result() -> StudyResult:
     return StudyResult(
         number="3.4",
         assignment='The scan has "220" for the crank angle of the least position (L1962): read as 22 deg.',
-        claim="After a turn of transient the slider swings steadily between its start and the crank shaft; a stiffer "
-        "spring moves the mean position towards the start, and the least position to a smaller crank angle.",
+        claim="After a transient of one turn the slider oscillates steadily between its start and the crank shaft. A "
+        "stiffer spring moves the mean position towards the start, and the least position to a smaller crank angle.",
         columns=pad_columns(columns),
         # the statements compare the three springs
         statements=(*_steady_statements(), *_shape_statements()) if springs() == STIFFNESSES else (),
@@ -371,15 +377,15 @@ def _steady_statements() -> list[Statement]:
         max(t.change / np.ptp(t.slider_cm) for t in turns.values()),
         -CM_PER_METRE * table_3_1(0.0).ground_length,
     )
-    later = "the transient goes on"
+    later = "with the softer springs the transient lasts longer"
     return [
         Statement(
             "The figure shows that due to the initial condition assumptions that u and [u' = 0] a transient effect "
             "is shown over the first cycle.",
             text("3.2.1, L1944-1948"),
-            "greatest distance of u from the steady motion in the first and the second cycle, relative to its range; for *due "
-            "to*, change of u from cycle to cycle after a start in the steady motion; *over the first cycle* is read as no "
-            "longer",
+            "greatest distance of u from the steady motion in the first and the second cycle, relative to its range. For "
+            "*due to*: change of u from cycle to cycle after a start in the steady motion. *Over the first cycle* is read "
+            "as no longer than that",
             ALIKE_WORDS,
             (
                 at_least("first cycle, least of the springs", ALIKE, min(first.values())),
@@ -391,7 +397,7 @@ def _steady_statements() -> list[Statement]:
             "The steady state motion is periodic and oscillates about a mean position between the initial position "
             "of the slider and the crank shaft.",
             text("3.2.1, L1948-1954"),
-            "change of u from one cycle to the next, relative to its range; mean of u; the start has u = 0, the shaft "
+            "change of u from one cycle to the next, relative to its range; mean of u. The start is at u = 0, the shaft at "
             f"{shaft:g} cm",
             ALIKE_WORDS,
             (
@@ -405,7 +411,7 @@ def _steady_statements() -> list[Statement]:
         Statement(
             "This mean position shifts towards the slider initial position as the spring stiffness is increased.",
             text("3.2.1, L1954-1958"),
-            "mean of u, which is negative, relative to that with the next softer spring, the greater of the two",
+            "mean of u, which is negative, relative to the mean with the next softer spring; the greater of the two ratios",
             SIGN,
             (at_most("greatest", 1.0, greatest_ratio(np.array(list(means.values())))),),
         ),
@@ -421,12 +427,12 @@ def _steady_statements() -> list[Statement]:
             "However, as k is increased this minimum oscillation occurs at smaller crank angle and eventually occurs "
             "at zero degrees for k=2[x 10^6 dyne/cm].",
             text("3.2.1, L1962-1966"),
-            "crank angle of the least u: its growth from spring to spring, and its value",
+            "crank angle of the least u: its change from each spring to the next stiffer one, and its value",
             f"{SIGN}; {READ_DEG:g} deg, to which a graph can be read",
             (
                 at_most("growth to k = 1e6 dyn/cm", 0.0, places[1e6] - places[5e5], "deg"),
                 at_most("growth from 1e6 to 2e6 dyn/cm", 0.0, places[2e6] - places[1e6], "deg"),
-                near(_k(2e6), "0", places[2e6], READ_DEG, "deg", why="it comes later"),
+                near(_k(2e6), "0", places[2e6], READ_DEG, "deg", why="the minimum comes later"),
             ),
         ),
     ]
@@ -450,10 +456,15 @@ def _shape_statements() -> list[Statement]:
             "The rate of change of the slider position is approximately the same for all the response curves between "
             "the minimum and maximum values.",
             text("3.2.1, L1966-1972"),
-            "mean slope of u between the two, our choice, greatest over least of the three springs",
+            "mean slope of u between the two values (our choice), the greatest of the three springs divided by the least",
             f"{ABOUT:g}, the rule for *approximately*",
             (
-                at_most("from the least to the greatest u", 1.0 + ABOUT, rise, why="steeper with a stiffer spring"),
+                at_most(
+                    "from the least to the greatest u",
+                    1.0 + ABOUT,
+                    rise,
+                    why=("the slope is steeper with a stiffer spring"),
+                ),
                 at_most("from the greatest to the least u", 1.0 + ABOUT, fall),
             ),
         ),
@@ -461,9 +472,9 @@ def _shape_statements() -> list[Statement]:
             "However, as the spring stiffness is increased the spring force becomes dominant and the width of the "
             "response curve is decreased.",
             text("3.2.1, L1972-1976"),
-            "width, read as the crank angle from the least to the greatest u, relative to that with the next softer spring; "
-            "range over the turn, our choice, of the spring's force over the greater of the damper's and the mean effective "
-            "mass times the acceleration",
+            "width, read as the crank angle from the least to the greatest u, relative to the width with the next softer "
+            "spring. Then the range of the spring's force over the turn (our choice), divided by the greater of two ranges: "
+            "that of the damper's force and that of the mean effective mass times the acceleration",
             f"{SIGN}; at least 1, as *dominant* says",
             (
                 at_most("width, greatest", 1.0, greatest_ratio(widths)),
@@ -472,7 +483,7 @@ def _shape_statements() -> list[Statement]:
                     f"spring's share; {_k(2e6)}",
                     1.0,
                     shares[-1],
-                    why="the inertia force is greater",
+                    why="the inertia force is greater than the spring's",
                 ),
             ),
         ),
@@ -607,8 +618,8 @@ def torque_result() -> StudyResult:
     columns |= {f"crank torque; {_k(k)} [N.m]": turn.torque for k, turn in turns.items()}
     return StudyResult(
         number="3.5",
-        claim="The torque that holds the speed reverses suddenly about crank angle 0, and depends on the spring only "
-        "at its extremes, where the slider's accelerations differ.",
+        claim="The torque that holds the speed reverses suddenly about crank angle 0. It depends on the spring only at its "
+        "extremes, where the slider's accelerations differ.",
         columns=columns,
         statements=(*_torque_curves(), *_torque_causes(), _torque_conclusion()),
     )
@@ -635,8 +646,8 @@ def _torque_curves() -> list[Statement]:
         Statement(
             "The striking feature of the figure is the sudden reversal in torque in the region of [theta2 = 0 deg].",
             text("3.2.1, L1991-1993"),
-            "crank angle at which the torque passes zero between its greatest and least value, and that of its steepest "
-            "change in the whole turn, as *sudden* says",
+            "crank angle at which the torque passes zero between its greatest and its least value; for *sudden*, crank "
+            "angle of its steepest change in the whole turn",
             f"{ABOUT_DEG:g} deg, the rule for *in the region of* an angle",
             tuple(
                 near(f"{words}; {_k(k)}", "0", at, ABOUT_DEG, "deg")
@@ -649,9 +660,9 @@ def _torque_curves() -> list[Statement]:
             "stiffness k. The exception is at the maximum and minimum values where a slight variation is "
             "recorded.",
             text("3.2.1, L1995-2001"),
-            "distance between the curves, square to them, on a graph as wide as it is high, our choice, relative to its "
-            "size, farther than 10 deg, the rule for *near*, from an extreme; spread of the extremes between the springs, "
-            f"relative to that with {_k(1e6)}",
+            "distance between the curves, perpendicular to them, on a graph as wide as it is high (our choice), relative to "
+            "the size of the graph, at angles farther than 10 deg, the rule for *near*, from an extreme. Then the spread of "
+            f"each extreme between the springs, relative to the extreme with {_k(1e6)}",
             f"{ALIKE_WORDS}; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
             (
                 at_most("distance of the curves", ALIKE, np.max(seen, axis=0)[away > 10.0].max()),
@@ -661,7 +672,7 @@ def _torque_curves() -> list[Statement]:
                         computed=np.ptp(x) / abs(x[1]),
                         lower=ALIKE,
                         upper=SLIGHTLY,
-                        why=f"at the {name} torque the springs differ by less",
+                        why=f"at the {name} torque the springs differ by less than that",
                     )
                     for name, x in extremes.items()
                 ),
@@ -693,16 +704,17 @@ def _torque_causes() -> list[Statement]:
             f"share of the slider's acceleration in {difference}",
             "more than half, as *due to* says",
             tuple(at_least(name, 0.5, x) for name, x in shares["acceleration"].items()),
-            "the terms with the squares of the velocities, at another position, make the difference",
+            "the difference comes from the terms with the squares of the velocities, because the slider is at another "
+            "position",
         ),
         Statement(
             "The independence of [the] torque of the stiffness k may be explained by the fact that the spring "
             "presents no external load on the mechanism. The only effect results from the slight change in the "
             "geometry which leads to changes in inertial loads.",
             text("3.2.1, L2005-2013"),
-            "shares, in the difference of the row before, of the inertial loads, all but the weight, and of the slider's "
-            "position alone, mean of its change before that of its rates and after; greatest spread of u between the springs "
-            f"over the {to_shaft:.2f} cm from start to shaft",
+            "shares in the difference of the row before: of the inertial loads (all but the weight), and of the slider's "
+            "position alone (the mean of its effect when it is changed before its rates and after them). Then the greatest "
+            f"spread of u between the springs, relative to the {to_shaft:.2f} cm from start to shaft",
             f"{ALIKE:g}, the rule for *the same*, as *only* says; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
             (
                 *(
@@ -712,7 +724,7 @@ def _torque_causes() -> list[Statement]:
                 ),
                 Case(label="change in the geometry", computed=moved, lower=ALIKE, upper=SLIGHTLY),
             ),
-            "the rates of the slider take part of the position's effect back; *no external load* is not judged",
+            "the slider's rates cancel part of the effect of its position. *No external load* is not judged",
         ),
         Statement(
             "The energy dissipation in the slider guide due to viscous friction also accounts for variations in "
@@ -737,15 +749,15 @@ def _torque_conclusion() -> Statement:
         "different springs for this particular mechanism occurs only at the instances when appreciable differences in "
         "the slider accelerations leading to different inertial loads are present.",
         text("3.2.1, L2017-2029"),
-        "of the crank angles at which the springs' torques differ, the share at which the slider's accelerations differ too; "
-        "for *leading to different inertial loads*, greatest difference of the acceleration's part of the torque; all relative "
-        "to the greatest torque, or acceleration, in size",
+        "among the crank angles at which the torques of the springs differ, the share at which the slider's accelerations "
+        "differ too. For *leading to different inertial loads*: greatest difference of the part of the torque that the "
+        "acceleration causes. All differences are relative to the greatest size of the torque or acceleration",
         f"all; {ALIKE_WORDS}",
         (
             near("torques differ where accelerations do", 1.0, np.mean(unequal[apart > ALIKE] > ALIKE), 0.0),
             at_least("acceleration's part", ALIKE, inertial),
         ),
-        "the accelerations differ so at every crank angle, most where the torques hardly do",
+        "the accelerations differ by so much at every crank angle, and most where the torques hardly differ",
     )
 
 

@@ -37,26 +37,26 @@ from ..study import Study, StudyResult
 from .runs import ALIKE_WORDS, SIGN
 
 FINDINGS = """\
-**Claims.** Sections 4.1 to 4.4 linearise the mechanism about the four-bar with its slider at rest, to one equation
-(4.21) with periodic coefficients, and balance two of its harmonics. Section 4.5 finds the resonance within 1 rad/s
-below the frequency of the spring with rocker and slider alone, in proportion to the rocker's inertia, the first
-harmonic dominant, and what a damper does to it.
+**Claims.** Sections 4.1 to 4.4 linearise the mechanism about the four-bar with its slider at rest. The result is one
+equation (4.21) with periodic coefficients, of which two harmonics are balanced. Section 4.5 finds that the resonance lies
+within 1 rad/s below the frequency of the spring with rocker and slider alone, that this distance is proportional to the
+rocker's inertia, that the first harmonic is dominant, and how a damper acts on it.
 
-**What stands.** The equations of motion (4.10) to (4.20) and the linearised kinematics (4.8) are right, and for a
-massless coupler and the rocker's mass centre on the slider so are, to first order, the inertia of (4.21) and its force
-as the listing has it. The resonance lies below omega_k by about 1 rad/s for each unit of I4, nearly all of it by the
-mean of the rocker's inertia, and comes with I4 = 0 to that of a mass on a spring; amplitudes grow with I4, and so do
-widths at a given amplitude; the damper acts near the resonance alone, where the curves are those of a single mass.
+**What stands.** The equations of motion (4.10) to (4.20) and the linearised kinematics (4.8) are right. For a massless
+coupler and the rocker's mass centre on the slider, the inertia of (4.21) and its force as in the listing are right to first
+order. The resonance lies below omega_k by about 1 rad/s for each unit of I4, nearly all of it due to the mean of the
+rocker's inertia; at I4 = 0 it is that of a mass on a spring. Amplitudes grow with I4, and so do the widths at a given
+amplitude. The damper acts only near the resonance, where the curves are those of a single mass.
 
-**What does not.** (4.21) lacks M' zeta', the rate of the periodic mass, and its H1 is three times too large. The
-expansion (4.23) keeps harmonics of second order but not the part of second order of the mean, and (4.34) puts
-lambda_c for lambda_c k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of
-spring and damper, and its K is wrong: its resonances are 0.02 to 0.04 rad/s too low at I4 = 0.5 and 1, which its steps
-of 0.1 rad/s hide. The force of (4.21), right to first order alone, has a third of its second harmonic, and with the
-halved factors a sixth, so that the slider's is about seven times too small. So the thesis could call the second
-harmonic negligible everywhere; in truth it is so, at the same speed, above 22 rad/s alone, and near half the natural
-frequency it is the greater. The frequency of the free motion falls with the damper, by 5 mrad/s, but the peaks of the
-curves, which the figures show, rise."""
+**What does not.** (4.21) lacks M' zeta', the rate of the periodic mass, and its H1 is three times too large. The expansion
+(4.23) keeps harmonics of second order but not the second-order part of the mean, and (4.34) has lambda_c in place of
+lambda_c k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of spring and damper,
+and its K is wrong. Its resonances are therefore 0.02 to 0.04 rad/s too low at I4 = 0.5 and 1, which its steps of 0.1 rad/s
+hide. The force of (4.21) is right only to first order: its second harmonic is a third of the right one, and a sixth with
+the halved factors, so that the slider's second harmonic is about seven times too small. This is why the thesis could call
+the second harmonic negligible everywhere. In truth it is negligible, at the same speed, only above 22 rad/s, and near half
+the natural frequency it exceeds the first. The frequency of the free motion falls with the damper, by 5 mrad/s, but the
+peaks of the curves, which the figures show, move to higher speeds."""
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 for which appendix 2 gives the resonance.
@@ -204,17 +204,17 @@ def compute_first() -> StudyResult:
     return StudyResult(
         number="4.3",
         claim="First harmonic over the crank speed without damping, for three inertia ratios.",
-        assignment="The three inertia ratios are ours: 1 and 0.5 of Fig 4.6 and 4.7, and 1.5.",
+        assignment="The three inertia ratios are our choice: 1 and 0.5 of Fig 4.6 and 4.7, and 1.5.",
         columns=undamped_columns(1),
         statements=(
             Statement(
                 "The figures show that resonance for the first harmonic occurs in the region of ([omega_k] - d) < "
                 "[omega] < [omega_k] where d = 1 rad./sec.",
                 text("4.5.1, L3139-3143"),
-                "distance below omega_k = 31.623 rad/s of the resonance by the right equation, the lower of the two "
-                "neighbouring roots of the determinant of (4.33); I4 of Figs 4.6 and 4.7",
-                f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*; the one digit of d would allow more, "
-                "0.5",
+                "distance below omega_k = 31.623 rad/s of the resonance by the right equation, which is the lower of the "
+                "two neighbouring roots of the determinant of (4.33); I4 as in Figs 4.6 and 4.7",
+                f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*; half a unit of the one digit of d "
+                "would allow more, 0.5",
                 (
                     *(
                         Case(
@@ -229,14 +229,14 @@ def compute_first() -> StudyResult:
                     ),
                     Case(label="third ratio", computed=None, why="the text does not name the third ratio"),
                 ),
-                f"at 1.5, which is ours, it would be {below[1.5]:.2f} rad/s",
+                f"at 1.5, our choice, the distance would be {below[1.5]:.2f} rad/s",
             ),
             Statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
                 text("4.5.1, L3143-3146"),
-                "distance of the resonance below omega_k that follows from the mean of M alone, which is above 1 by the "
-                "rocker's inertia, over that of the lower root of the determinant; "
-                "*oscillating inertia of the rocker* is read as the inertia of the rocker, which oscillates",
+                "distance of the resonance below omega_k that follows from the mean of M alone, divided by the distance of "
+                "the lower root of the determinant. The mean of M exceeds 1 by the rocker's inertia. *Oscillating inertia "
+                "of the rocker* is read as the inertia of the rocker, which oscillates",
                 ALIKE_WORDS,
                 tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),
@@ -244,19 +244,19 @@ def compute_first() -> StudyResult:
                 "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of [I4] "
                 "and that as [I4] increases it widens the region of resonance.",
                 text("4.5.1, L3156-3162; the same in L3197-3201"),
-                "amplitudes by the right equation without a damper, 9 to 40 rad/s, farther than 1 rad/s from 15.5 and 2 rad/s "
-                "from 31 rad/s, and range of speeds in which they exceed a level, relative to those at the next smaller I4, "
-                "least; speeds and levels are ours",
+                "amplitudes by the right equation without a damper, from 9 to 40 rad/s except within 1 rad/s of 15.5 and 2 "
+                "rad/s of 31 rad/s; then the range of speeds in which the amplitudes exceed a level. Each is relative to "
+                "its value at the next smaller I4, and the least ratio is listed. Speeds and levels are our choice",
                 SIGN,
                 (*judge_growth(1), *judge_growth(2)),
             ),
             Statement(
                 "THIS PROG. I[NVE]STIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
                 listing("appendix 2, L8398"),
-                "*investigates* is read as finds right: speed and height of the peak of the first harmonic and height of the "
-                f"second's, by the listing and by the right equation; omega_c = {DAMPERS[0]:g} 1/s, the listing's first "
-                "damper, its I4 = 1 and, for Fig 4.7, 0.5",
-                f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
+                "*investigates* is read as finds right: speed and height of the peak of the first harmonic, and height of "
+                f"the peak of the second, by the listing and by the right equation. omega_c = {DAMPERS[0]:g} 1/s is the "
+                "listing's first damper; I4 = 1 is the listing's, and 0.5 that of Fig 4.7",
+                f"{HALF_STEP:g} rad/s, half the listing's step in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "the force of the listing lacks most of its second harmonic (erratum 21)",
             ),
@@ -279,15 +279,15 @@ def compute_second() -> StudyResult:
     return StudyResult(
         number="4.4",
         claim="Second harmonic over the crank speed without damping, for three inertia ratios.",
-        assignment="The three inertia ratios are ours, those of Fig 4.3.",
+        assignment="The three inertia ratios are our choice, as in Fig 4.3.",
         columns=columns,
         statements=(
             Statement(
                 "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
-                "greatest root of the determinant of (4.33) by the right equation at I4 = 0.5, 1 and 1.5, the upper of the two "
-                "neighbouring ones at each resonance; change of this root from one I4 to the next",
+                "greatest root of the determinant of (4.33) by the right equation at I4 = 0.5, 1 and 1.5, the upper of the "
+                "two neighbouring roots at each resonance; change of this root from each I4 to the next",
                 SIGN,
                 (
                     at_most("root of the first harmonic", OMEGA_K, max(first), "rad/s"),
@@ -304,16 +304,17 @@ def compute_second() -> StudyResult:
                 "It is also clear by comparing the amplitude values in both figures that the first harmonic of the "
                 "solution is dominant and the second harmonic may be neglected in comparison.",
                 text("4.5.1, L3162-3168; the same in L3210-3214"),
-                "second harmonic, and greatest of the third to the tenth (*higher*, L3212), over the first: greatest over "
-                "greatest, and at the same speed; the most of the three I4, 9 to 40 rad/s, ours; right equation with omega_c = "
-                f"{COMPARED_AT:g} 1/s, the value of 5.3.2; without a damper the resonances have no bound",
-                f"1 for *dominant*, the greater; {SMALL:g}, the rule for *negligible*",
+                "second harmonic, and greatest of the third to the tenth (*higher*, L3212), divided by the first: the "
+                "greatest values of each, and the values at the same speed. The largest ratio of the three I4 from 9 to 40 "
+                f"rad/s (our choice) is listed, by the right equation with omega_c = {COMPARED_AT:g} 1/s, the value of "
+                "5.3.2; without a damper the resonances have no bound",
+                f"1, since the *dominant* harmonic is the greater; {SMALL:g}, the rule for *negligible*",
                 (
                     *(at_most(f"first dominant; {words}", 1.0, share) for words, share in seconds.items()),
                     *(at_most(f"second negligible; {words}", SMALL, share) for words, share in seconds.items()),
                     *(at_most(f"higher negligible; {words}", SMALL, share) for words, share in highers.items()),
                 ),
-                "near omega_k/2 the second has its own resonance, near omega_k/3 the third",
+                "near omega_k/2 the second harmonic has its own resonance, and near omega_k/3 the third",
             ),
         ),
     )
@@ -364,15 +365,15 @@ def compute_deviation() -> StudyResult:
     return StudyResult(
         number="4.5",
         claim="The deviation of the resonance from omega_k falls linearly with the inertia ratio, to zero.",
-        assignment="The range of I4 is ours.",
+        assignment="The range of I4 is our choice.",
         columns=columns,
         statements=(
             Statement(
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
                 "[I4] and becomes zero when [I4=0].",
                 text("4.5.1, L3146-3150"),
-                "distance of the deviation of the lower root from omega_k, by the right equation, from the straight line "
-                "through zero and its value at I4 = 1.5, ours, relative to that value; deviation at I4 = 0",
+                "deviation of the lower root from omega_k, by the right equation: its distance from the straight line "
+                "through zero and its value at I4 = 1.5 (our choice), relative to that value; then the deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
                 (
                     at_most("distance from the line", ALIKE, bent),
@@ -486,8 +487,8 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
     return StudyResult(
         number=number,
         claim=f"First harmonic over the crank speed with dampers, I4 = {inertia_ratio:g}.",
-        assignment="The dampers are those of the listing of appendix 2; that the amplitude is the first harmonic's "
-        "is ours.",
+        assignment="The dampers are those of the listing of appendix 2. We take the amplitude to be that of the first "
+        "harmonic.",
         columns=columns,
         statements=_curves() if number == "4.6" else _dampers(),
     )
@@ -501,8 +502,8 @@ def _curves() -> tuple[Statement, ...]:
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
             text("4.5.2, L3176-3178; the same in L3203-3204"),
             f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, relative to the peak at "
-            f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s, ours, from the "
-            "peaks; the second harmonic too, as L3203 says it of *the solution*",
+            f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s (our choice) from "
+            "the peaks. The second harmonic is included, since L3203 speaks of *the solution*",
             ALIKE_WORDS,
             tuple(
                 at_most(f"{name}; {label}", ALIKE, found[name])
@@ -513,12 +514,12 @@ def _curves() -> tuple[Statement, ...]:
         Statement(
             "The resonance curves are similar to a second order linear system",
             text("4.5.3 d, L3206-3208"),
-            "greatest distance of the first harmonic, in Figs 4.6 and 4.7, from the amplitude of one mass on a spring, with "
-            "the means of M and K and the first harmonic of F, relative to the peak; right equation, 27 to 35 rad/s, ours, "
-            f"omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
+            "greatest distance of the first harmonic, in Figs 4.6 and 4.7, from the amplitude of a single mass on a spring, "
+            "relative to the peak. The single mass has the means of M and K and the first harmonic of F. Right equation, 27 "
+            f"to 35 rad/s (our choice), omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
             f"{ABOUT:g}, the rule for *similar*",
             tuple(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
-            "near half the natural frequency the second harmonic has its own resonance, see L7102",
+            "but near half the natural frequency the second harmonic has its own resonance, see L7102",
         ),
     )
 
@@ -533,16 +534,16 @@ def _dampers() -> tuple[Statement, ...]:
             "The natural frequency decreases slightly with increase of damping.",
             text("4.5.2, L3178-3180"),
             f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s by the right equation: of the free "
-            "motion, by its multipliers at 20 rad/s, ours, and of the peak of the curves, which the figures show",
-            f"{SIGN}: a damper of {100 * ratio:.1f} % of the critical cannot lower a frequency by the 5 % of the rule for "
-            "*slightly*",
+            "motion, by its multipliers at 20 rad/s (our choice); and of the peak of the curves, which the figures show",
+            f"{SIGN}: a damper of {100 * ratio:.1f} % of the critical one cannot lower a frequency by 5 %, as the rule for "
+            "*slightly* would require",
             tuple(
                 at_most(
                     f"{name}; {label}",
                     0.0,
                     1e3 * found[name],
                     "mrad/s",
-                    why="the force grows with the square of the speed",
+                    why="the peak rises because the force grows with the square of the speed",
                 )
                 for label, found in both.items()
                 for name in ("of the free motion", "of the peak")
@@ -552,9 +553,9 @@ def _dampers() -> tuple[Statement, ...]:
             "It also shows that a smaller value of damping eliminated resonance for the case of [I4]=0.5 than that for "
             "[I4] = 1.",
             text("4.5.2, L3182-3184"),
-            "damper that lowers the peak of the first harmonic to 1.5, 2 or 5 times its amplitude "
-            f"{OUTSIDE:g} rad/s above the peak, our reading of *eliminated*; at I4 = 0.5 relative to that at I4 = 1; "
-            "right equation",
+            f"damper that lowers the peak of the first harmonic to 1.5, 2 or 5 times its amplitude {OUTSIDE:g} rad/s above "
+            "the peak, which is our reading of *eliminated*; its value at I4 = 0.5 relative to that at I4 = 1; right "
+            "equation",
             SIGN,
             tuple(at_most(f"{times:g} times", 1.0, less / more) for times, less, more in zip(TIMES, low, high)),
         ),

@@ -40,30 +40,31 @@ from .regions import LOOKS, WAYS, appendix_3_region, axis, equation, hill_region
 from .runs import SIGN
 
 FINDINGS = """\
-**Claims.** Chapter V takes the homogeneous equation (4.29), finds its first region of instability, near twice the
-natural frequency, by perturbation and by a determinant, follows it over the rocker's inertia, the crank's and the
-coupler's length, and removes it with a damper.
+**Claims.** Chapter V takes the homogeneous equation (4.29) and finds its first region of instability, near twice the
+natural frequency, by perturbation and by a determinant. It follows this region over the rocker's inertia, the crank's
+length and the coupler's length, and removes it with a damper.
 
 **What stands.** The formulas (5.13), (5.16), (5.26) and the determinant (5.35) agree with each other. The region is
-narrow, widens with I4 and with the crank, and moves in proportion to I4 from A = 2. A damper narrows and removes it;
-over I4 and the crank's length 0.45 1/s is more than twice what is needed.
+narrow, widens with I4 and with the crank's length, and moves away from A = 2 in proportion to I4. A damper narrows and
+removes it; over I4 and over the crank's length, 0.45 1/s is more than twice what is needed.
 
-**What does not.** The equation lacks M' zeta' and is taken about zeta = 0, which is no motion of the slider. For this
+**What does not.** The equation lacks M' zeta' and is linearised about zeta = 0, which is not a motion of the slider. For this
 reason, and because of a wrong K, halved harmonics of the mass and a lost 1/k0, the region of the listing is 2.7 times too
-wide: 0.25786 to 0.26031 at I4 = 0.5, where the right linear equation has 0.25832 to 0.25922. The damper that removes the
-region up to I4 = 1.5 is 0.167 1/s, where the listing needs 0.459. The second region is not negligible: it is half as
-wide as the first, and with the longest crank wider. The axes of Fig 5.2 and 5.3 are not those of I4 = 1 and 2, which the
-text has, but nearly those of I4 = 0.5, which the listing has. Fig 5.3 varies the coupler with the angles held, to which
-another ground link belongs at each length; on the same ground link the region widens beyond about equal links. Nor is the
-region of Fig 5.3 narrower than that of Fig 5.2. With two harmonics of the coefficients the determinant does not give the
-third region, and with nine terms not the fourth; without a damper (5.35) is met at every stable speed, not at the boundaries
-alone. The zeroth boundary does not part two stable regions: at higher speeds the slider falls away, and a damper only slows
-it."""
+wide: 0.25786 to 0.26031 at I4 = 0.5, where the right linear equation has 0.25832 to 0.25922. A damper of 0.167 1/s removes
+the region up to I4 = 1.5, where the listing needs 0.459. The second region is not negligible: it is half as wide as the
+first, and wider than the first with the longest crank. The axes of Figs 5.2 and 5.3 are not those of I4 = 1 and 2, which
+the text has, but nearly those of I4 = 0.5, which the listing has. Fig 5.3 varies the coupler with the angles held, which
+requires another ground link at each length. On the same ground link the region widens when the coupler is longer than about
+sigma3 = 1. Nor is the region of Fig 5.3 narrower than that of Fig 5.2. With two harmonics of the coefficients the determinant
+does not give the third region, and with nine terms it does not give the fourth. Without a damper, (5.35) is satisfied at
+every stable speed, not only at the boundaries. The zeroth boundary does not separate two stable regions: at higher speeds
+the slider falls away, and a damper only slows it.
+"""
 
 #: Inertia ratios of appendix 3 whose regions are compared.
 COMPARED = (0.5, 1.0, 1.5)
 #: Tolerance of the axis A, in words.
-OF_AXIS = f"{ABOUT:g} of 2 - A, the rule for *approximately*; {ABOUT:g} of A itself would admit any region"
+OF_AXIS = f"{ABOUT:g} of 2 - A, the rule for *approximately*, because {ABOUT:g} of A itself would admit any region"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,9 +162,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "As is clearly seen the region is narrow and its width increases with increase of I4.",
             text("5.3.1, L3762-3764; the same in L3944-3946"),
-            "width of the region relative to its middle, the greatest; growth of the width from one I4 to the next, the "
-            "least; true periodic motion",
-            f"{SMALL:g}, the rule for *small*, for *narrow* too; {SIGN}",
+            "greatest width of the region relative to its middle; least growth of the width from one I4 to the next; for "
+            "the true periodic motion",
+            f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {SIGN}",
             (
                 at_most("width", SMALL, (widths(true) / (middles + 0.25)).max()),
                 at_least("growth", 0.0, np.diff(widths(true)).min()),
@@ -173,9 +174,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "The region in [lambda_k^2] as a band also increases linearly with [I4] indicating that [insta]bility occurs "
             "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
             text("5.3.1, L3764-3770; the same in L3946-3950"),
-            "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative to "
-            "the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A with I4; true periodic motion, at "
-            "I4 = 0 the right linear equation",
+            "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative "
+            "to the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A with I4. For the true periodic "
+            "motion, at I4 = 0 for the right linear equation",
             f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
             (
                 at_most("distance from the line", ALIKE, bent),
@@ -186,34 +187,34 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "Also notice that a region was not obtained but merely a boundary of two stable regions.",
             text("5.1.1 a, L3420-3424"),
-            "number of boundaries, below the second region, at which a Floquet multiplier is 1; greater size of the two "
-            "multipliers at 1.5 times lambda_k^2 of this boundary, the most of I4 = 0.5, 1 and 1.5, and at half of it, the "
-            "least (places ours); right linear equation without a damper",
-            "none: it is one boundary or it is not, and stability decides, but for rounding errors of 1e-9",
+            "number of boundaries, below the second region, at which a Floquet multiplier is 1. Then the larger of the two "
+            "multipliers at I4 = 0.5, 1 and 1.5: the greatest at 1.5 times lambda_k^2 of this boundary, and the least at "
+            "half of it (our choice); right linear equation without a damper",
+            "none for the number; 1 for stability, with 1e-9 for rounding errors",
             judge_zeroth_boundary(),
-            "below it, which is at higher speeds, the slider falls away",
+            "below the boundary, at higher speeds, the slider falls away",
         ),
         Statement(
             "Therefore from ([5].2), (5.4) and (5.12) we obtain [(5.13)] ... a region for [lambda_k^2] may be defined by "
             "[(5.16)] in which the system is unstable ... the second region of instability may now be defined by [(5.26)]",
             text("5.1.1, eqs (5.13), (5.16), (5.26), L3404-3416, L3446-3464, L3555-3575"),
-            "boundaries by the formulas less those by the determinant (5.35), equation (4.29) as printed, relative to the "
-            "region's width, (5.13) to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. Signs that our scan lacks "
-            "follow from (5.2), (5.11) and (5.23)",
-            f"{SMALL:g}, the rule for *small*: the next order",
+            "boundaries by the formulas minus those by the determinant (5.35), for equation (4.29) as printed, relative to "
+            "the region's width, and with (5.13) relative to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. "
+            "Signs that our scan lacks follow from (5.2), (5.11) and (5.23)",
+            f"{SMALL:g}, the rule for *small*, for the next order",
             judge_formulas(),
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
-            "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing to the letter, I4 = 0.5, at "
-            "sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
-            f"{SMALL:g} of the width by the latter, the rule for *small*: the next order, which (5.16) leaves out",
+            "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing exactly as printed, at its I4 = "
+            "0.5 and at sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
+            f"{SMALL:g} of the width by the right equation, the rule for *small*, for the next order, which (5.16) leaves out",
             tuple(
                 near(side, f"{stated:.6f}", computed, SMALL * linear.width)
                 for side, stated, computed in (("lower", listed.low, linear.low), ("upper", listed.high, linear.high))
             ),
-            "M' zeta' and 1/k0 are missing, the harmonics of mass and stiffness are wrong (errata 2, 16, 18, 20)",
+            "M' zeta' and 1/k0 are missing, and the harmonics of mass and stiffness are wrong (errata 2, 16, 18, 20)",
         ),
     )
 
@@ -299,8 +300,8 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
             "However the region diverges about an axis approximately given by [omega]=A.[omega_k] where A=1.968 when "
             "[sigma2] = 0.01 and increasing very slightly with increase of [sigma2].",
             text("5.3.1, L3878-3882"),
-            "axis A = omega/omega_k in the middle of the region at sigma2 = 0.01; its growth up to 0.1; true periodic motion. "
-            "That the region diverges is judged above",
+            "axis A = omega/omega_k in the middle of the region at sigma2 = 0.01; growth of A up to sigma2 = 0.1; for the "
+            "true periodic motion. That the region diverges is judged in the row above",
             f"{OF_AXIS}; {SIGN}",
             (
                 near("A", "1.968", axes(true)[0], ABOUT * (2.0 - 1.968)),
@@ -311,8 +312,9 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
         Statement(
             "The[ ]region is narrower than that of Fig. (5.1).",
             text("5.3.1, L3882-3884"),
-            why="the range of I4 in Fig 5.1 is not said: in the true periodic motion the greatest width, up to sigma2 = 0.1 "
-            "(L3927), is " + ", ".join(f"{x:.2f} of that up to {RANGES[most]}" for most, x in over.items()),
+            why="the range of I4 in Fig 5.1 is not stated. In the true periodic motion the greatest width, up to sigma2 = "
+            "0.1 (L3927), is "
+            + ", ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
         ),
     )
 
@@ -354,18 +356,18 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "The width of the region decreases with increase of [sigma3].",
             text("5.3.1, L3892; the same in L3938-3942"),
-            "growth of the width from one sigma3 to the next, the greatest of 0.8 to 1.2 in steps of 0.025; true periodic "
-            "motion",
+            "greatest growth of the width from one sigma3 to the next, from 0.8 to 1.2 in steps of 0.025; for the true "
+            "periodic motion",
             SIGN,
             tuple(at_most(words, 0.0, np.diff(widths(found_regions)).max()) for words, found_regions in both.items()),
-            "on the same ground link the region widens beyond about equal links",
+            "on the same ground link, the region widens when the coupler is longer than about sigma3 = 1",
         ),
         Statement(
             "It also converges about an axis given by [omega]=A.[omega_k] where A=1.96 when [sigma3] = 0.8 and stays "
             "approximately constant with increase of [sigma3].",
             text("5.3.1, L3892-3898"),
-            "axis A at sigma3 = 0.8; its range over sigma3 = 0.8 to 1.2, relative to 2 - A at 0.8; true periodic motion. That "
-            "the region converges is judged above",
+            "axis A at sigma3 = 0.8; its range over sigma3 = 0.8 to 1.2, relative to 2 - A at 0.8; for the true periodic "
+            "motion. That the region converges is judged in the row above",
             f"half a unit of the last digit; {OF_AXIS}",
             tuple(
                 case
@@ -380,8 +382,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
-            "greatest width of the region, angles held, over that of each; true periodic motion. The range of I4 in Fig 5.1 is "
-            "not said: it is read, by us, as at L3882",
+            "greatest width of the region, with the angles held, relative to that of each other figure; for the true "
+            "periodic motion. The range of I4 in Fig 5.1 is not stated; we take the two ranges of the row at L3882",
             SIGN,
             (
                 *(
@@ -390,19 +392,20 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
                     )
                     for most, width in widest_by_inertia().items()
                 ),
-                at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and widens the region"),
+                at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and a greater I4 widens the region"),
             ),
         ),
         Statement(
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
             "[sigma3] and [I4] it was negligible.",
             text("5.3.1, L3902-3906"),
-            "width of the second region in lambda_k^2 over that of the first, the greatest of each figure, in Fig 5.3 with the "
-            "angles held; right linear equation",
-            f"{SMALL:g}, the rule for *negligible*, of the first: of its own middle even the first would be negligible",
+            "width of the second region in lambda_k^2 relative to that of the first, the greatest of each figure, in Fig "
+            "5.3 with the angles held; right linear equation",
+            f"{SMALL:g}, the rule for *negligible*, relative to the first region; relative to its middle even the first "
+            "region would be negligible",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
-            "in the width of the first the terms of first order largely cancel; by the listing of appendix 4 they do not, and "
-            f"it is at most {max(listed.values()):.3f} (errata 2, 16, 17, 20)",
+            "in the width of the first region the terms of first order largely cancel. By the listing of appendix 4 they do "
+            f"not, and the ratio is at most {max(listed.values()):.3f} (errata 2, 16, 17, 20)",
         ),
     )
 
@@ -418,8 +421,8 @@ SWEEPS = {
             mechanism=chapter_4,
             claim="The first region of instability in lambda_k^2 over I4; sigma2 = 0.05.",
             judge=judge_inertia,
-            assignment="I4 = 0.25 to 2 in steps of 0.25 is our choice. Remarks a and b (L3938-3946) speak of stability, which "
-            "is read as a narrow region. The true periodic motion is that of the mechanism itself.",
+            assignment="I4 = 0.25 to 2 in steps of 0.25 is our choice. Remarks a and b (L3938-3946) speak of stability, "
+            "which we read as a narrow region. The true periodic motion is the motion of the mechanism itself.",
         ),
         Sweep(
             number="5.2",
@@ -440,7 +443,7 @@ SWEEPS = {
             judge=judge_coupler,
             assignment=(
                 "The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
-                "and rocker (L8641-8688), to which another ground link and an inclined guide belong at every sigma3. We also "
+                "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We also "
                 "vary the coupler on the same ground link."
             ),
             further={SAME_GROUND: with_same_ground},

@@ -42,26 +42,26 @@ from ..study import Study, StudyResult, pad_columns
 from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, WEIGHT, N, ellipse, rocker_function
 
 FINDINGS = """\
-The chapter claims that the downhill simplex, begun at many random sets of lengths and angles, finds the four-bar of least
-error for a curve with or without timing or for a function of the rocker's angle. It prints eight linkages, seven of them
+**Claims.** The downhill simplex, started from many random sets of lengths and angles, finds the four-bar with the least error
+for a curve with or without timing, or for a function of the rocker's angle. The chapter prints eight linkages, seven of them
 with their errors.
 
-*What stands.* The area by triangles is the area between the curves if the partners are chosen, the crank's phase does not
-change it, and both closures of the links have to be tried. Weights do what they are said to do. The linkages for ellipse and
-path (b) are less accurate than those for (a), which are close. The printed linkage for path (b) has the stated area once a
-digit is mended, and the packaging machine's push is straight to 3 % of its length. Searches that begin with 12 of the 72 points
-reach lower errors with fewer evaluations; with 36 the errors alone are lower.
+**What stands.** The area by triangles is the area between the curves if the partners are chosen. The crank's phase does not
+change this area, and both closures of the links have to be tried. Weights act as stated. The linkages for ellipse and path (b)
+are less accurate than those for (a), which are close. The printed linkage for path (b) has the stated area once a digit is
+mended, and the packaging machine's push is straight to 3 % of its length. Searches that begin with 12 of the 72 points reach
+lower errors with fewer evaluations; searches that begin with 36 reach lower errors, but not with fewer evaluations.
 
-*What does not.* Six of the seven errors are not those of the printed linkages, with the misprints mended that we found and
-each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. Those of the two rocker
-functions are missed by 0.3 to 0.4 % in the nearest of many readings. Nor are the linkages for ellipses and paths minima
-(L5136), and within our limits there are linkages with a fortieth to a fifth of their errors (L7026). The search itself,
-repeated from the program, stops each time before it is at a minimum. To begin with five of the ten parameters gains nothing;
-with nine the errors are lower, for more evaluations.
+**What does not.** Six of the seven errors are not those of the printed linkages, even with the misprints that we found mended
+and each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. The errors of the two rocker
+functions differ from the stated ones by 0.3 to 0.4 % in the nearest of many readings. The linkages for ellipses and paths are
+not minima (L5136), and within our limits other linkages have a fortieth to a fifth of their errors (L7026). The search itself,
+repeated from the program, always stops before it reaches a minimum. Starting with five of the ten parameters gains nothing.
+Starting with nine gives lower errors, but needs more evaluations.
 
-*Our limits.* Without bounds the problem has no solution: the longer the links, the smaller the error. So no link is longer
-than the longest of the printed linkage (Fig 6.6: its printed bounds, and r at most 30 cm), and the transmission angle is at
-least 40 deg; for the rocker functions the crank turns fully instead.
+**Our limits.** Without bounds the problem has no solution: the longer the links, the smaller the error. Therefore none of our
+links is longer than the longest of the printed linkage (Fig 6.6: its printed bounds, and r at most 30 cm), and the
+transmission angle is at least 40 deg. For the rocker functions the crank turns fully instead.
 """
 
 FloatArray = NDArray[np.float64]
@@ -122,15 +122,17 @@ def our_error(name: str) -> float:
 
 #: Tolerance of a printed error, in words.
 HALF = "half a unit of the last digit"
-#: What is judged of a printed linkage, and what the errors of both rocker functions are taken to be.
-ROUNDED = "the nearest to the stated one that rounding each printed number of the linkage up or down gives"
-READING = (
-    "(6.18) has no weights, and no number of crank angles is printed. Read: 18 to 360 angles in equal steps of whole or half "
-    "degrees, with the end of the turn or without; the weighted errors added up and divided by 1000, or those within the "
-    "window alone; the window with both its ends or without. The plots have the window with both."
+#: How a printed linkage is rounded before its error is judged; our readings of the errors of the rocker functions.
+ROUNDED = (
+    "with each printed number of the linkage rounded up or down so that the result comes nearest to the stated one"
 )
-#: Why a stated error of a coupler curve is not that of the printed linkage; see test_chapter_6.py.
-NO_DIGIT = "no rounding gives it, nor any other digit in a single place"
+READING = (
+    "(6.18) has no weights, and the number of crank angles is not printed. We try these readings: 18 to 360 angles in equal "
+    "steps of whole or half degrees, with the end of the turn or without; the weighted errors added up and divided by 1000, "
+    "or only those within the window; the window with both its ends or without. The plots have the window with both."
+)
+#: Reason why the stated error of a coupler curve does not belong to the printed linkage; see test_chapter_6.py.
+NO_DIGIT = "no rounding gives the stated value, nor does any other digit in a single place"
 #: Numbers of crank angles, in steps of whole or half degrees, that the errors of the rocker functions may refer to.
 NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
 
@@ -187,7 +189,7 @@ def rounding_range(name: str) -> dict[str, tuple[float, float]]:
     return {reading: (min(e[reading] for e in errors), max(e[reading] for e in errors)) for reading in errors[0]}
 
 
-def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives it") -> Case:
+def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives the stated value") -> Case:
     """Judge whether a stated error lies in one of the ranges of `rounding_range`; the range nearest to the error counts."""
     ranges, wanted = rounding_range(name), float(stated)
     nearest = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
@@ -209,8 +211,8 @@ def _ellipse_a() -> tuple[Statement, ...]:
             "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output and in "
             "fact has an error value [E1p] of 0.889 cm2.",
             text("6.4.2 A, L4864"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; for *favourably* the rms "
-            "distance over the ellipse's longer semi-axis",
+            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}. For *favourably*, the rms "
+            "distance relative to the ellipse's longer semi-axis",
             f"{HALF}; {ALIKE:g}, the rule for *the same*",
             (judge_stated_error("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
         ),
@@ -223,8 +225,8 @@ def _ellipse_b() -> tuple[Statement, ...]:
             "However, as may be seen from fig. (6.5), the four bar is not able to produce output (b) to the same tolerances "
             "and has an error [E1p] of 4.001 cm2.",
             text("6.4.2 A, L4870"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; error of this linkage over "
-            "that of Fig 6.4, both as printed",
+            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; error of this linkage "
+            "relative to that of Fig 6.4, both as printed",
             f"{HALF}; at least 1, the rule for *greater*",
             (
                 judge_stated_error("error", "4.001", "ellipse-b", NO_DIGIT),
@@ -249,8 +251,8 @@ def _bounded() -> tuple[Statement, ...]:
             "obtained. Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the "
             "following constraints [10 < l1, l3, l4 < 30, 10 > l2].",
             text("6.4.2 A, L4905-4917"),
-            "lengths of the printed linkage, and of that of Fig 6.4, that are out of these bounds",
-            "none of a count; one is enough for *different*",
+            "number of lengths outside these bounds, of the printed linkage and of that of Fig 6.4",
+            "none for the numbers; one outside is enough for *different*",
             (
                 near("lengths outside, printed", 0.0, outside(p.linkage), 0.0),
                 at_least("lengths outside, Fig 6.4", 1.0, outside(PROBLEMS["ellipse-a"].linkage)),
@@ -261,7 +263,7 @@ def _bounded() -> tuple[Statement, ...]:
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
             f"sum of the squared distances of the printed linkage at {N} crank angles, with a1 = -93.8 deg (erratum 11), "
-            f"{ROUNDED}; increase over that of Fig 6.4, likewise",
+            f"{ROUNDED}; increase over the error of Fig 6.4, rounded likewise",
             HALF,
             (
                 judge_stated_error("error", "53.6", "ellipse-a-bounded", NO_DIGIT),
@@ -283,8 +285,8 @@ def _rocker() -> tuple[Statement, ...]:
             "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
             "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
             text("6.4.2 B, L4965"),
-            "error of the printed linkages, each of their printed numbers rounded up or down, by that reading of "
-            "those named above that comes nearest to the stated error",
+            "error of the printed linkages, with each printed number rounded up or down, by that of the readings above that "
+            "comes nearest to the stated error",
             HALF,
             (
                 judge_stated_error("unweighted", "700.0", "rocker"),
@@ -317,9 +319,10 @@ def _weighted() -> tuple[Statement, ...]:
             "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
             "the expense of the remaining portions of the output.",
             text("6.4.2 B, L4973; also 6.2.2, L4247"),
-            "rms error of the weighted printed linkage within the window over the function's range of 100 deg; its squared "
-            f"errors over those of the unweighted one, within the window and out of it; {N} crank angles",
-            f"{ALIKE:g}, the rule for *the same*, for *closely*; at most 1 where it gains, at least 1 where it loses",
+            "rms error of the weighted printed linkage within the window, relative to the function's range of 100 deg; its "
+            f"squared errors relative to those of the unweighted linkage, within the window and outside it; {N} crank angles",
+            f"{ALIKE:g}, the rule for *the same*, which we use for *closely*; at most 1 within the window, at least 1 "
+            "outside it",
             (
                 at_most("rms error within the window", ALIKE, np.sqrt(inside / within.sum()) / 100.0),
                 at_most("squared errors within it", 1.0, inside / even_inside),
@@ -330,9 +333,10 @@ def _weighted() -> tuple[Statement, ...]:
             "This procedure of weighting factors may be used when outputs in the form of straight lines are required by "
             "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
             text("6.4.2 B, L4981"),
-            "rms distance of our best linkage from 13 points of a line of 100 mm, passed within 60 deg of crank rotation, "
-            "all others weighted zero; the example is ours, within our limits for ellipse (a), timed",
-            f"{100.0 * ALIKE:g} mm, {ALIKE:g} of its length: the rule for *straight*",
+            "rms distance of our best linkage from 13 points of a line of 100 mm, which it passes within 60 deg of crank "
+            "rotation; all other points have the weight zero. The example is ours: timed, and within our limits for ellipse "
+            "(a)",
+            f"{100.0 * ALIKE:g} mm, {ALIKE:g} of the line's length, the rule for *straight*",
             (at_most("distance", 100.0 * ALIKE, straight_error(), "mm"),),
         ),
     )
@@ -345,9 +349,9 @@ def _paths() -> tuple[Statement, ...]:
             "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
             "as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
             text("6.4.3, L5043"),
-            "area between the curves of the printed linkages, mended as below: that of (a) over the area of its ellipse, that "
-            "of (b) over that of (a)",
-            f"{ALIKE:g}, the rule for *the same*, for *tolerable*; at least 1, the rule for *greater*",
+            "area between the curves of the printed linkages, mended as in the next row: for (a) relative to the area of "
+            "its ellipse, for (b) relative to that for (a)",
+            f"{ALIKE:g}, the rule for *the same*, which we use for *tolerable*; at least 1, the rule for *greater*",
             (
                 at_most("(a) over its ellipse", ALIKE, printed_error("path-a") / ellipse_cm2),
                 at_least("(b) over (a)", 1.0, printed_error("path-b") / printed_error("path-a")),
@@ -390,11 +394,11 @@ TABLE = {
         'The scan has "10 2" for the bound of the crank (L4917): read as l2 < 10 cm.',
     ),
     "6.7": Row(
-        "rocker", "A four-bar makes the rocker function with a sum of squared errors of 700 deg2.", _rocker, READING
+        "rocker", "A four-bar generates the rocker function with a sum of squared errors of 700 deg2.", _rocker, READING
     ),
     "6.8": Row(
         "rocker-weighted",
-        "Weighted by 1000 from 60 to 260 degrees the rocker function is made with an error of 35.0 deg2.",
+        "With a weight of 1000 from 60 to 260 degrees, the rocker function is generated with an error of 35.0 deg2.",
         _weighted,
         READING,
     ),

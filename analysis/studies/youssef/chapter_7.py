@@ -30,28 +30,29 @@ from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 
 FINDINGS = """\
-The chapter claims that a four-bar whose rocker pivot slides under control reaches every point within the envelope of its
-coupler curves, so that the slider can correct what the links cannot trace; it finds the slider's motion by a variational
-method, exact at each crank angle, and by a direct search for a Fourier series.
+**Claims.** A four-bar whose rocker pivot slides under control reaches every point within the envelope of its coupler curves,
+so that the slider can correct what the links cannot trace. The chapter finds the slider's motion by a variational method,
+exact at each crank angle, and by a direct search for a Fourier series.
 
-*What stands.* Precision points may be kept while the motion between them changes. The coupler that points at the desired
-point gives the least error, exactly. Two harmonics of the slider can reduce the error of all eight problems of chapter VI,
-that of the weighted rocker function fifty times where its stroke is not limited. For path (b) the printed series gives the
+**What stands.** Precision points may be kept while the motion between them changes. The coupler that points at the desired
+point gives exactly the least error. Two harmonics of the slider can reduce the error of all eight problems of chapter VI; that
+of the weighted rocker function falls to a fiftieth if the stroke is not limited. For path (b) the printed series gives the
 stated 4.3 cm2, within the rounding of its numbers, once l4 is mended as in chapter VI and A0 = 3.1 is read as 0.31. A
-series with enough terms reaches what the variational method does. Cams of a few centimetres can drive such a slider; on a
-machine with twice the friction of the model, coupler and slider a tenth heavier and a load of 6 N a drive without feedback
-fails within half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
+series with enough terms reaches what the variational method reaches. Cams of a few centimetres can drive such a slider. We
+tried a machine with twice the friction of the model, coupler and slider heavier by a tenth and a load of 6 N: a drive without
+feedback fails within half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
 
-*What does not.* The envelope has a hole where all curves of the family go round the same place: by two limits of U P
-reaches 74 and 89 % of what it encloses; between -1.5 and 1.5, where the crank turns fully but at +-0.5, it reaches all.
-If the coupler cannot point at the desired point the rocker need not stand upright: for places below the slider's line it
-hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the readings tried (of its signs, of
-A0 and of its argument): as printed the links cannot be joined, and where they can the error is more than with the pivot
-fixed. That for path (b) is within 5 % of the best that we find.
+**What does not.** The envelope has a hole where all curves of the family go round the same region. For two of our limits of
+U, P reaches only 74 and 89 % of the area within the envelope; with U from -1.5 to 1.5, where the crank turns fully except at
++-0.5, it reaches all. If the coupler cannot point at the desired point, the rocker need not stand upright: for places below the
+slider's line it hangs. The printed series for the rocker function does not give the stated 4.8 deg2 in any reading that we
+tried (of its signs, of A0 and of its argument). As printed, the links cannot be joined; in the readings in which they can, the
+error is greater than with the pivot fixed. The printed series for path (b) is within 5 % of the best that we find.
 
-*What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. Its figures are drawn with a curve
-of ours, and what the thesis says of the lost one has no verdict. Of a mechanism that corrects itself neither the adjustment
-nor the criterion is stated. Methods that are only named, as teach-in, latches or further inputs, have no example to judge.
+**What cannot be told.** Series 1 (Fig 7.4 to 7.10) rests on a desired curve that is lost. We draw its figures with a curve of
+our own, and give no verdict on what the thesis says about the lost curve. For a mechanism that corrects itself, the thesis
+states neither the adjustment nor the criterion. Methods that are only named, such as teach-in, latches or further inputs,
+have no example to judge.
 """
 
 FloatArray = NDArray[np.float64]
@@ -72,7 +73,7 @@ P1, P2 = radians(150.0), radians(210.0)
 WITHIN = (ROTATION > P1 - 1e-9) & (ROTATION < P2 + 1e-9)
 #: Weight on p1 p2, relative to 1 elsewhere; number of harmonics in a series of eleven terms.
 WEIGHT, HARMONICS = 5.0, 5
-SERIES_1 = "Desired curve: ours, see Fig 7.4."
+SERIES_1 = "The desired curve is ours, see Fig 7.4."
 LOST = "the desired curve is lost with its figure"
 #: Limits of U within which the family of coupler curves is drawn; the limits of the thesis are lost.
 LIMITS = ((FAMILY[0], FAMILY[-1]), (0.501, 1.499), (-1.499, 1.499))
@@ -217,39 +218,39 @@ def family() -> StudyResult:
     off_arc = np.abs(radii - LINKAGE.point_distance).max()
     return StudyResult(
         number="7.2",
-        claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler curves.",
-        assignment="Links of series 1 (L5720): l2 = r = 0.5, l3 = l4 = 1. The values of U are lost: 0.6 to 1.4 are our choice; "
-        "the crank turns fully from -1.5 to 1.5 but at +-0.5.",
+        claim="With the slider free, P reaches any point on or within the outer boundaries of the family of coupler curves.",
+        assignment="Links of series 1 (L5720): l2 = r = 0.5, l3 = l4 = 1. The values of U are lost: 0.6 to 1.4 are our "
+        "choice. The crank turns fully from -1.5 to 1.5 except at +-0.5.",
         columns=pad_columns(columns),
         statements=(
             Statement(
                 "If, however, a second input is established to which a controller is attached the output may be modified, "
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
-                f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2), "
-                f"the greatest of a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (ours): at the {PRECISION} precision points, "
-                "where u = 0; in the part between two of them where it is least",
-                f"1e-12 l3, the rounding; more than {READ:g} l3, what a graph can be read to",
+                f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2): "
+                f"the greatest for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (our choice) at the {PRECISION} precision "
+                "points, where u = 0; and the same in that part between two of them in which it is least",
+                f"1e-12 l3, for rounding errors; more than {READ:g} l3, the accuracy to which a graph can be read",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),
                     at_least("between the precision points", READ, changed, "l3"),
                 ),
-                "the variety is infinite, as a may have any value",
+                "the variety is infinite, since a may have any value",
             ),
             Statement(
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "
                 "coupler-point by suitable combination of [theta2] and U.",
                 text("7.0, L5242"),
-                "area that P reaches over the area within the outer boundary of the family, for three limits of U (ours), the "
-                "links assembled as in the plot",
-                "1 %, ours, above the error of the areas",
+                "area that P reaches, relative to the area within the outer boundary of the family, for three limits of U "
+                "(our choice), with the links assembled as in the plot",
+                "1 %, our choice, which exceeds the error of the areas",
                 tuple(
                     near(
                         f"U from {low:g} to {high:g}",
                         1.0,
                         area.area / enclosed_area(low, high),
                         0.01,
-                        why="what all curves of the family go round is out of reach",
+                        why="the region round which all curves of the family go is out of reach",
                     )
                     for (low, high), area in areas.items()
                 ),
@@ -259,11 +260,11 @@ def family() -> StudyResult:
                 "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
                 "continuous variation of U is specified.",
                 text("7.0, L5260"),
-                f"distance of P from B less r: its greatest size at {TURN.size - 1} crank angles and {ALONG.size} values of U "
-                f"from {1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}",
-                "1e-12 l3, the rounding",
+                f"distance of P from B minus r: its greatest size at {TURN.size - 1} crank angles and {ALONG.size} values of "
+                f"U from {1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}",
+                "1e-12 l3, for rounding errors",
                 (at_most("", 1e-12, off_arc, "l3"),),
-                "with theta2 and U given, P is one point of the arc",
+                "once theta2 and U are given, P is one point of the arc",
             ),
         ),
     )
@@ -337,8 +338,8 @@ def curve_wanted() -> StudyResult:
         number="7.4",
         claim="The desired curve is given by numbers, depends on time, and lies within the family of Fig 7.2.",
         assignment=(
-            "The curve is lost. Ours: where P is at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad ahead, at 72 "
-            "crank angles; p1 p2 from 150 to 210 deg."
+            "The curve is lost. Ours consists of the places of P at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad "
+            "ahead, at 72 crank angles; p1 p2 is the part from 150 to 210 deg."
         ),
         columns=pad_columns(columns),
         statements=(
@@ -391,10 +392,13 @@ def two_positions() -> StudyResult:
         columns |= xy(name, np.array([joint, end + 0j]))
     return StudyResult(
         number="7.5",
-        claim="The coupler points at the desired point, the rocker in either of two positions; else the rocker is upright.",
+        claim=(
+            "The coupler points at the desired point, with the rocker in either of two positions; otherwise the rocker is "
+            "upright."
+        ),
         assignment=f"{SERIES_1} The figure is drawn with the crank at {degrees(ROTATION[k]):.0f} deg. The statements are "
-        f"judged with {ROTATION.size} random points, one at each crank angle by {360 / ROTATION.size:g} deg, no farther from A "
-        "than l3 along either axis.",
+        f"judged with {ROTATION.size} random points, one for every {360 / ROTATION.size:g} deg of the crank, no "
+        "farther from A than l3 along either axis.",
         columns=pad_columns(columns),
         statements=_positions(),
     )
@@ -424,19 +428,19 @@ def _positions() -> tuple[Statement, ...]:
         )
     reached = pins[missing, None] + LINKAGE.point_distance / LINKAGE.coupler_length * arms
     by_7_15 = np.abs(reached - places[missing, None]).min(axis=1) - least[missing]
-    fine = "1e-3 l3: where the error is least, P moves by at most {:.2g} l3 from one position to the next"
+    fine = "1e-3 l3: near the least error, P moves by at most {:.2g} l3 from one slider position to the next"
     lines = [
         f"{side.sum()} points {where}" for side, where in ((above, "above the slider's line"), (~above, "below it"))
     ]
-    hangs = "there it hangs, and none that is upright can be assembled"
+    hangs = "below the line the rocker hangs, and no upright rocker can be assembled"
     return (
         Statement(
             "[Equation (7.12)] corresponds to the relation that for minimum error the coupler takes the position of a "
             "straight line with the point p(x*, y*).",
             text("7.3.1, L5628"),
-            f"error with the coupler pointing at the point less the least of {POSITIONS.size} slider positions, u from "
-            f"{POSITIONS[0]:g} to {POSITIONS[-1]:g} l3, and both assemblies: the greatest of the {off.size} points where "
-            "(7.14) has a real root",
+            f"error with the coupler pointing at the point minus the least error of {POSITIONS.size} slider positions (u "
+            f"from {POSITIONS[0]:g} to {POSITIONS[-1]:g} l3) and both assemblies: the greatest difference at the {off.size} "
+            "points where (7.14) has a real root",
             fine.format(moved[~missing].max()),
             (at_most("greatest difference", 1e-3, off.max(), "l3"),),
         ),
@@ -445,10 +449,10 @@ def _positions() -> tuple[Statement, ...]:
             "solution of (7.10b). In physical reality this is equivalent to the coupler being in a straight line with the "
             "desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
             text("7.3.1, L5675-5685"),
-            f"at the {standing.size} points where it is negative: distance of C from the slider's line, over l4, the coupler "
-            "pointing at the point: the least; share of rockers at right angles to the line at the least error, as (7.11b), "
-            f"cos th4 = 0, says: size of sin th4 above {UPRIGHT:g}",
-            "more than 1: a rocker of length l4 does not reach the line; none of the share",
+            f"at the {standing.size} points where it is negative: least distance of C from the slider's line, relative to "
+            "l4, with the coupler pointing at the point. Then, at the least error, the share of rockers perpendicular to "
+            f"the line, as (7.11b), cos th4 = 0, says: size of sin th4 above {UPRIGHT:g}",
+            "more than 1, since a rocker of length l4 then does not reach the line; none for the share",
             (
                 at_least("distance of C", 1.0, heights.min()),
                 near("cos th4 = 0", 1.0, np.mean(np.abs(upright) > UPRIGHT), 0.0),
@@ -458,9 +462,10 @@ def _positions() -> tuple[Statement, ...]:
             "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
             "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
             text("7.3.1, L5685"),
-            f"at the {standing.size} points where (7.14) has no real root: share of upright rockers, sin th4 > {UPRIGHT:g}, at "
-            "the least error; greatest error with U by (7.15) less the least of the slider positions above",
-            f"none: *must surely be*; {fine.format(moved[missing].max())}",
+            f"at the {standing.size} points where (7.14) has no real root: share of upright rockers, sin th4 > {UPRIGHT:g}, "
+            "at the least error. Then the greatest difference between the error with U by (7.15) and the least error of the "
+            "slider positions above",
+            f"none for the share, as *must surely be* says; {fine.format(moved[missing].max())}",
             (
                 near(f"upright, the {lines[0]}", 1.0, standing[above].mean(), 0.0),
                 near(f"upright, the {lines[1]}", 1.0, standing[~above].mean(), 0.0, why=hangs),
@@ -471,9 +476,9 @@ def _positions() -> tuple[Statement, ...]:
             "Now since a true global optimum may be found readily at first trial from the variational method, one may "
             "argue the philosophy behind the use of any other method.",
             text("7.3.1, L5772-5776"),
-            "share of the points at which U by (7.14), solved once, or by (7.15) where (7.14) has no real root, gives the "
-            "least error of the slider positions above",
-            f"{fine.format(moved.max())}; none of the share",
+            "share of the points at which U gives the least error of the slider positions above. U is solved once by "
+            "(7.14), or by (7.15) where (7.14) has no real root",
+            f"{fine.format(moved.max())}; none for the share",
             (
                 at_least(f"(7.14), {off.size} points", 1.0, np.mean(off <= 1e-3)),
                 at_least(
@@ -483,7 +488,7 @@ def _positions() -> tuple[Statement, ...]:
                     why="below the slider's line (7.15) has no real U",
                 ),
             ),
-            "that one may argue claims nothing",
+            "*one may argue* is not judged, since it claims nothing",
         ),
     )
 
@@ -538,14 +543,18 @@ def _unweighted() -> tuple[Statement, ...]:
             "The variational method located the true global optimum which the direct search located as best as an "
             "eleven-term Fourier series could provide.",
             text("7.3.1, L5764"),
-            why=f"{LOST}; with ours the best eleven terms have {excess:.2f} times the squared error of the variational motion",
+            why=(
+                f"{LOST}. With ours, the best eleven terms have {excess:.2f} times the squared error of the variational "
+                "motion"
+            ),
         ),
         Statement(
             "If an infinite number of terms were used the direct search would have led to the variational results.",
             text("7.3.1, L5768"),
-            "squared error of the series with as many terms as there are desired points, which takes the variational U at "
-            "each, over that of the variational method, less 1; 20 random curves of 73 points (ours), greatest",
-            "1e-9, the rounding",
+            "squared error of the series with as many terms as there are desired points, divided by that of the variational "
+            "method, less 1. This series takes the variational U at each point. The greatest value for 20 random curves of "
+            "73 points (our choice)",
+            "1e-9, for rounding errors",
             (
                 at_most("the best series", 1e-9, all_terms_excess()),
                 Case(label="the series found", computed=None, why="no search has infinitely many coefficients"),
@@ -562,16 +571,16 @@ def _unweighted() -> tuple[Statement, ...]:
             "greater effort than would otherwise be needed with a direct search. In fact, in some cases, the direct search "
             "method is required to solve these equations.",
             text("7.3.1, L5883-5891"),
-            "number of equations in this mechanism: (7.6), one for each of theta3, theta4 and U, and the two of the closure "
+            "number of equations for this mechanism: three by (7.6), for theta3, theta4 and U, and the two of the closure "
             "(7.7)",
-            "none of a count",
+            "none, since counts are exact",
             (
                 replace(near("equations", 5.0, 3 + 2, 0.0), stated="n + m"),
-                Case(label="effort", computed=None, why="that of neither method is stated"),
+                Case(label="effort", computed=None, why="the effort of neither method is stated"),
                 Case(label="direct search required", computed=None, why="no such case is given"),
             ),
-            "one of the five, (7.10c), is linear, lambda1 = 0, and the thesis then solves them one after another (L5607-5640); "
-            "*non-linear* is read as said of the set",
+            "one of the five, (7.10c), is linear: lambda1 = 0. The thesis then solves them one after another (L5607-5640). "
+            "We read *non-linear* as said of the set",
         ),
     )
 
@@ -592,8 +601,8 @@ def _weighted() -> tuple[Statement, ...]:
             "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger errors "
             "are tolerated outside it.",
             text("7.3.1, L5834"),
-            why=f"{LOST}; with ours the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, on the rest "
-            f"of {outside:.2f}",
+            why=f"{LOST}. With ours, the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, and on the "
+            f"rest by a factor of {outside:.2f}",
         ),
         Statement(
             "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller motion U "
@@ -643,7 +652,8 @@ class Motions(NamedTuple):
 
 TABLE = {
     "7.6": Motions(
-        "The variational motion is the nearest that U can come; eleven terms come near it and can be followed at speed.",
+        "The variational motion comes as near to the curve as U allows; eleven terms come near this motion and can be "
+        "followed at speed.",
         ("variational", "direct"),
         "U",
         _unweighted,
@@ -656,12 +666,12 @@ TABLE = {
         see="7.6",
     ),
     "7.9": Motions(
-        "With p1 p2 weighted five times the slider moves otherwise.",
+        "With p1 p2 weighted five times, the slider moves differently.",
         ("direct", "weighted"),
         "U",
         _weighted,
-        assignment=f'{SERIES_1} The weight reads "=. 5w 2" in the scan (L5815): {WEIGHT:g} is taken, as p1 p2 is to be '
-        "the closer part (L5807).",
+        assignment=f'{SERIES_1} The weight reads "=. 5w 2" in the scan (L5815): we take {WEIGHT:g}, since p1 p2 is '
+        "to be the closer part (L5807).",
     ),
     "7.10": Motions(
         "The weighted part p1 p2 is traced more closely, the rest less so.",

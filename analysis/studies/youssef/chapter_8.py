@@ -23,31 +23,31 @@ from ..study import Study, StudyResult
 from . import rig_1, rigs
 
 FINDINGS = """\
-The chapter claims that two rigs bear out the theory: rig 1 (vertical, springs A and B) the equations of chapters II and
-III, rig 2 (horizontal, a crank of a twentieth of the links, springs C and D) the linearised equation of chapter IV. The
-measured curves are lost with the figures, so that no sentence which compares a measured curve with theory can be judged.
-What can be judged is what the theory gives for the printed masses, springs and dampers at the stated speeds; a sentence that
-describes a measured motion alone is judged by it. The amplitude is half the range of the slider's position u over a turn.
-Sentences that describe the rigs, or tell what was done, claim nothing and have no verdict.
+**Claims.** Two rigs confirm the theory: rig 1 (vertical, springs A and B) the equations of chapters II and III, and rig 2
+(horizontal, with a crank of a twentieth of the links, springs C and D) the linearised equation of chapter IV. The measured
+curves are lost with the figures, so that no sentence that compares a measured curve with theory can be judged. We judge what
+the theory gives for the printed masses, springs and dampers at the stated speeds, and judge by it also a sentence that only
+describes a measured motion. The amplitude is half the range of the slider's position u over a turn. Sentences that describe
+the rigs, or tell what was done, claim nothing and have no verdict.
 
-*What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
-A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies of rig 1 lie in the regions stated,
-and its amplitude has its maximum below resonance near half of them, at 290 and 577 rpm (290 and 580), if the springs, which
-are printed to one and two digits, are taken as they suit best within their rounding; as printed they make it 296 and 564.
-Within it the natural frequencies of rig 2 are those calculated. Rig 2 is in resonance at 586 and 828 rpm (585 and 825), its
-first harmonic is that of a damped mass on a spring under an unbalance, and the linear equation of chapter IV, once it is
-corrected, is within three per cent of the full ones in amplitude at all its speeds.
+**What stands.** The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
+A, four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies of rig 1 lie in the regions stated. Its
+amplitude has its maximum below resonance near half of these frequencies, at 290 and 577 rpm (290 and 580), if the springs,
+printed to one and two digits, have the values within their rounding that fit best; with the springs as printed it is at 296
+and 564 rpm. Within the same rounding the natural frequencies of rig 2 are those calculated. Rig 2 is in resonance at 586 and
+828 rpm (585 and 825), and its first harmonic is that of a damped mass on a spring under an unbalance. The linear equation of
+chapter IV, once corrected, agrees with the full equations within three per cent in amplitude at all speeds of rig 2.
 
-*What does not.* With spring A the minimum that follows this maximum is at 353 rpm or more, not at 345. At 500 rpm a shoulder
-is left of the peaks that have met. The third harmonic of rig 1 is up to 0.44 of the greater of the first two. The theory has
-effects at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half of that of rig 2, which the
-thesis did not see: there rig 2 moves in no sine, the second harmonic being 0.9 (C) and 1.6 (D) times the first. At their
-greatest it is 32 times smaller than the first, not 50. With spring B the guide is said to have been too short at 800 rpm, but
-the slider moves more than twice as far near half the natural frequency, where the rig did run.
+**What does not.** With spring A the minimum that follows this maximum is at 353 rpm or more, not at 345. At 500 rpm a shoulder
+is left of the peaks that have met. The third harmonic of rig 1 is up to 0.44 of the greater of the first two. The theory shows
+effects that the thesis did not see: at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half of
+that of rig 2. There rig 2 does not move like a sine, since the second harmonic is 0.9 (C) and 1.6 (D) times the first. The
+greatest second harmonic is 32 times smaller than the greatest first, not 50. With spring B the guide is said to have been too
+short at 800 rpm, but the slider moves more than twice as far near half the natural frequency, where the rig did run.
 
-*Why.* Resonance of rig 2 is said to have been wider, and the amplitude beyond it larger, than in theory. What the linear
-equation ignores makes both smaller. Friction and a stronger damper widen the resonance and lower the amplitude beyond it, a
-weaker damper the reverse: no one of them does both.
+**Why.** The thesis says that the resonance of rig 2 was wider, and the amplitude beyond it larger, than in theory. The terms
+that the linear equation ignores make both smaller. Friction and a stronger damper widen the resonance but lower the amplitude
+beyond it, and a weaker damper does the reverse: none of them does both.
 """
 
 # --- 8.7 to 8.18: the slider over the crank angle
@@ -121,12 +121,12 @@ OF_FIGURES = {s: sorted({*SPEEDS[s], *rig_1.COMPARED[s]}) for s in "AB"}
 #: Tolerance of a speed that is printed in tens of rpm.
 TENS = "5 rpm, half a unit of the last digit of a speed in tens"
 #: Choice of the speed that is compared with the stated one, in words.
-NEAREST = "a stated speed is compared with the nearest within the rounding of the printed stiffness"
+NEAREST = "a stated speed is compared with the nearest speed that the rounding of the printed stiffness allows"
 
 
 def _periodic() -> tuple[Statement, ...]:
     """Judge Fig 8.7: one cycle of the slider takes one turn of the crank, at the speed of the figure and at all others."""
-    stable = "below 1: the motion of one crank cycle exists, and every motion near it tends to it"
+    stable = "below 1: then the motion of one crank cycle exists, and every motion near it tends to it"
     largest = [
         at_most(
             f"spring {s}, to {rig_1.STOPPED[s]} rpm",
@@ -142,8 +142,9 @@ def _periodic() -> tuple[Statement, ...]:
         Statement(
             "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
             text("8.4.1.1, L6437"),
-            "at the 18 speeds of Fig 8.7 to 8.17: fewest maxima and minima of u, together, in a turn; largest Floquet "
-            "multiplier of the motion of one crank cycle, the factor by which a small departure from it grows in a turn",
+            "least number of maxima and minima of u, together, in a turn, at the 18 speeds of Fig 8.7 to 8.17. Then the "
+            "largest Floquet multiplier of the motion of one crank cycle, which is the factor by which a small departure "
+            "from it grows in a turn",
             f"at least 2, for *oscillatory*; {stable}",
             (at_least("maxima and minima", 2.0, fewest), at_most("multiplier", 1.0, here)),
         ),
@@ -157,8 +158,8 @@ def _periodic() -> tuple[Statement, ...]:
             "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
             "crank cycle.",
             text("8.4.1.1, L6449"),
-            f"largest Floquet multiplier of the motion of one crank cycle, from {rigs.SLOWEST:g} rpm (ours) to the greatest "
-            "speed that was run with each spring (L6555)",
+            f"largest Floquet multiplier of the motion of one crank cycle, from {rigs.SLOWEST:g} rpm (our choice) to the "
+            "greatest speed that was run with each spring (L6555)",
             stable,
             tuple(largest),
         ),
@@ -215,8 +216,8 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
             "spring B in the region of 1160 RPM.",
             text("8.4.1.2, L6551"),
-            "crank speed at the natural frequency, by the stiffness and the effective mass of the slider with the links, its "
-            "mean over a turn with u = 0",
+            "crank speed at the natural frequency, by the stiffness and the effective mass of the slider with the links "
+            "(its mean over a turn with u = 0)",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
                 near(f"spring {s}", stated, rigs.natural_speed(s), ABOUT * float(stated), "rpm")
@@ -228,8 +229,9 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "in the crank cycle, more than one harmonic is present in the solution.",
             text("8.4.1.2, L6579"),
             f"number of the {len(shown)} speeds of Fig 8.8 to 8.10, 8.14 and 8.15 at which u has four maxima and minima "
-            "together in a turn, our reading of *peaks*; second harmonic over the first, the least of all of them",
-            f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*: it is seen",
+            "together in a turn, which is our reading of *peaks*. Then the second harmonic relative to the first, the least "
+            "of all these speeds",
+            f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*, so that the harmonic is seen",
             (
                 at_least("speeds with four peaks", 0.5 * len(shown), of_four),
                 at_least("second harmonic over first", SMALL, second),
@@ -254,8 +256,9 @@ def _amplitude_a() -> Statement:
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
         "which it increases with increase of speed.",
         text("8.4.1.2, L6734"),
-        f"amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures; {NEAREST}, of one digit",
-        f"{TENS}; 0.5 rpm of 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
+        f"amplitude over the speed with spring A, from 240 rpm, the lowest speed of the figures; {NEAREST}, which has one "
+        "digit",
+        f"{TENS}; 0.5 rpm for 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; for rises the sign alone",
         (
             at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
             near(_rounded("speed of the maximum", tops), "290", np.clip(290.0, *tops), 5.0, "rpm"),
@@ -266,11 +269,11 @@ def _amplitude_a() -> Statement:
                 "345",
                 rigs.extrema_near_half("A", soft)[1],
                 unit="rpm",
-                why="no one stiffness gives both speeds",
+                why="no single stiffness gives both speeds",
             ),
             at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),
         ),
-        f"with the stiffness as printed the maximum is at {top:.0f} rpm, the minimum at {low:.0f}",
+        f"with the stiffness as printed, the maximum is at {top:.0f} rpm and the minimum at {low:.0f}",
     )
 
 
@@ -287,7 +290,7 @@ def _least_rise(spring: str, speeds: Sequence[float]) -> float:
 def _fig_8_15() -> tuple[Statement, ...]:
     at_500, shoulder = (
         rigs.turn("A", 500.0),
-        "the point of inflection has not reached the third peak: a shoulder is left",
+        "the point of inflection has not reached the third peak; a shoulder is left",
     )
     u = rigs.slider(at_500)
     return (
@@ -296,9 +299,10 @@ def _fig_8_15() -> tuple[Statement, ...]:
             "coincide and become an inflection point and as the speed is increased further this inflection point coincides "
             "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
             text("8.4.1.2, L6724"),
-            "peaks of a turn, as at L6579; speed above which there are two instead of four; at 500 rpm points of inflection of "
-            "a turn, of which a sine has two, and second harmonic over the first",
-            f"none of a count; {TENS}; {ABOUT:g}, the rule for *nearly* a sine, our reading of *sinusoidal type*",
+            "number of peaks in a turn, as at L6579; speed above which there are two instead of four. Then, at 500 rpm, the "
+            "number of points of inflection in a turn (a sine has two), and the second harmonic relative to the first",
+            f"none for the numbers; {TENS}; {ABOUT:g}, the rule for *nearly*, since we read *sinusoidal type* as nearly a "
+            "sine",
             (
                 near("peaks at 240 rpm", "4", rigs.peaks(rigs.turn("A", 240.0)), 0.0),
                 near(
@@ -343,7 +347,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "As in the case of spring A the oscillations are periodic and each oscillation has four peaks.",
             text("8.4.1.2, L6750"),
             f"number of the {len(SPEEDS['B'])} speeds of Fig 8.16 and 8.17 at which a turn has four peaks, as at L6579",
-            "none of a count",
+            "none, since counts are exact",
             (near("speeds with four peaks", float(len(SPEEDS["B"])), four, 0.0),),
             "that they are periodic is judged at L6449",
         ),
@@ -351,9 +355,9 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
             "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
-            f"amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures; {NEAREST}, of two "
-            "digits",
-            f"{TENS}; {ALIKE:g}, the rule for *the same*; of rises and falls the sign alone",
+            f"amplitude over the speed with spring B, from 500 rpm, the lowest speed of the figures; {NEAREST}, which has "
+            "two digits",
+            f"{TENS}; {ALIKE:g}, the rule for *the same*; for rises and falls the sign alone",
             (
                 at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),
                 near(_rounded("speed of the maximum", tops), "580", np.clip(580.0, *tops), 5.0, "rpm"),
@@ -361,30 +365,30 @@ def _fig_8_16() -> tuple[Statement, ...]:
                 at_most("greatest rise by 10 rpm, 570 to 710 rpm", 0.0, -_least_rise("B", range(710, 569, -10)), "cm"),
                 at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
             ),
-            f"with the stiffness as printed the maximum is at {top:.0f} rpm",
+            f"with the stiffness as printed, the maximum is at {top:.0f} rpm",
         ),
         Statement(
             "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "
             "were observed at [w = wn/4, wn/3], where wn is the natural frequency.",
             text("8.4.1.2, L6770"),
-            "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no maximum is "
-            "found in the steps of the curve, there at most 4 rpm",
+            "rise of the amplitude to the maximum there from the next minimum, relative to this minimum; 0 if the curve, in "
+            "steps of at most 4 rpm there, has no maximum",
             rigs.SEEN_IN_RECORDS,
             tuple(
                 at_most(f"spring {s}, {part}, {rigs.natural_speed(s) / n:.0f} rpm", rigs.NOTICED, rigs.peak_rise(s, n))
                 for s, n, part in fractions
             ),
-            "the third and the fourth harmonic meet the natural frequency there",
+            "there the third and the fourth harmonic meet the natural frequency",
         ),
         Statement(
             "This suggested a slider solution based on the first and second harmonics, and that the third and higher "
             "harmonics are small in comparison.",
             text("8.4.1.2, L6774-6779"),
-            "greatest of the harmonics 3 to 6 over the greater of the first and second: the most and the least at the nine "
-            "speeds of Fig 8.7 to 8.17 with each spring",
+            "greatest of the harmonics 3 to 6, relative to the greater of the first and second: the most and the least at "
+            "the nine speeds of Fig 8.7 to 8.17 with each spring",
             f"{SMALL:g}, the rule for *small*",
             tuple(higher),
-            "the greatest is the third",
+            "the greatest of them is the third harmonic",
         ),
     )
 
@@ -399,8 +403,8 @@ def _fig_8_17() -> tuple[Statement, ...]:
             "The four peaks in the oscillations show the same tendency as for spring A, i.e. the first and last peaks "
             "coinciding and becoming an inflection point.",
             text("8.4.1.2, L6760"),
-            "speed at which first and last peak meet, so that two of the four are left, over the natural frequency (ours): "
-            "spring B's over spring A's",
+            "speed at which first and last peak meet, so that two of the four are left, relative to the natural frequency "
+            "(our measure): the value with spring B divided by that with spring A",
             f"{ALIKE:g}, the rule for *the same*",
             (near("spring B over A", 1.0, of_natural[1] / of_natural[0], ALIKE),),
         ),
@@ -408,10 +412,10 @@ def _fig_8_17() -> tuple[Statement, ...]:
             "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted from "
             "Figs. (8.11) to (8.13) and (8.16) to (8.17).",
             text("8.4.1.2, L6764"),
-            "speed at which first and last peak meet with spring B; crank angle from the last peak of a turn to the first of "
-            f"the next: greatest change from one speed of the figures to the next, from {late[0]:g} rpm on, where these two "
-            "are the first and the last",
-            "above 800 rpm, the greatest speed that was run with it; the sign alone",
+            "speed at which first and last peak meet with spring B. Then the crank angle from the last peak of a turn to "
+            f"the first of the next: its greatest change from one speed of the figures to the next, from {late[0]:g} rpm on, "
+            "where these two are the first and the last",
+            "above 800 rpm, the greatest speed that was run with this spring; for the change the sign alone",
             (
                 at_least("speed at which they meet", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
                 at_most("greatest change of the angle", 0.0, np.diff(angles).max(), "deg"),
@@ -467,8 +471,8 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "Typical experimentally observed slider oscillations are shown in Fig. (8.18) which exhibit an almost "
             "sinusoidal behaviour with a phase shift and also periodic in one crank cycle.",
             text(f"{section}, L6804"),
-            f"share of the speeds from {RUN[0]:g} to {RUN[1]:g} rpm, in tens, at which the second harmonic is at most "
-            f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle over all of them",
+            f"share of the speeds from {RUN[0]:g} to {RUN[1]:g} rpm, in steps of 10, at which the second harmonic is at most "
+            f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle at all these speeds",
             f"{almost}; more than half of the speeds, as *typical* says; below 1, as at L6437",
             (
                 *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
@@ -480,9 +484,9 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
             "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
             text(f"{section}, L6808"),
-            "second harmonic over the first, the most over the range, in steps of 10 rpm, then of 1 rpm about the greatest; "
-            "change of the phase of the first over the range",
-            f"{almost}; 90 deg, ours: half of what a resonance turns it by",
+            "greatest ratio of the second harmonic to the first over the range, in steps of 10 rpm, and of 1 rpm about the "
+            "greatest; change of the phase of the first harmonic over the range",
+            f"{almost}; 90 deg, our choice, half of the change of phase at a resonance",
             (
                 *(at_most(f"spring {s}, second over first", ABOUT, most[s], why=why) for s in "CD"),
                 *(at_least(f"spring {s}, change of the phase", 90.0, shift[s], "deg") for s in "CD"),
@@ -492,9 +496,9 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
             "small in comparison and no evidence of the third and higher harmonics exists.",
             text(f"{section}, L6814; again 8.4.2.2, L6968"),
-            "second harmonic over the first, as in the sentence before; greatest of the harmonics 3 to 6 over the greater of "
-            f"the two, the most from {RUN[0]:g} to {RUN[1]:g} rpm in tens",
-            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, for *no evidence* too",
+            "second harmonic relative to the first, as in the sentence before; greatest of the harmonics 3 to 6 relative to "
+            f"the greater of the two, the most from {RUN[0]:g} to {RUN[1]:g} rpm in steps of 10",
+            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *no evidence* too",
             tuple(
                 at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
                 for s in "CD"
@@ -536,9 +540,9 @@ def _like_one_mass(
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
             "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
             text("8.4.2.1, L6820"),
-            "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves as "
-            "the first harmonic of u does, 300 to 1000 rpm in tens: greatest F0 over the least, and range of phi; we read both "
-            "as constant over the speed",
+            "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves "
+            "as the first harmonic of u does, from 300 to 1000 rpm in steps of 10: greatest F0 divided by the least, and "
+            "range of phi. We read both as constant over the speed",
             f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
             (*constant, *phase),
             "F0 grows with the square of the speed, as under an unbalance, see L6970",
@@ -546,9 +550,9 @@ def _like_one_mass(
         Statement(
             "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
             text("8.4.2.2, L6970"),
-            "F0 (L6820) over the square of the speed: its range relative to its mean; amplitude of the slider over that of "
-            "such a system under an unbalance, with a force of this mean times the square of the speed: the greatest from 300 "
-            "to 1000 rpm, as at L6808",
+            "F0 (L6820) divided by the square of the speed: its range relative to its mean. Then the amplitude of the "
+            "slider, relative to that of such a system under an unbalance whose force is this mean times the square of the "
+            "speed: the greatest ratio from 300 to 1000 rpm, as at L6808",
             f"{ABOUT:g}, the rule for *similar*",
             (*spread, *beyond),
             "near half the natural frequency the second harmonic adds to the first",
@@ -557,7 +561,8 @@ def _like_one_mass(
 
 
 _TOGETHER = (
-    "The text names the six speeds of both figures together: the first three are shown in one, the others in the next."
+    "The text names the six speeds of both figures together. We show the first three in one figure, and the others in the "
+    "next."
 )
 _AGREE_A = (
     "Theory and experiment agree well, almost totally in phase; friction explains the slight variations of amplitude."
@@ -590,7 +595,7 @@ TURNS = (
         "8.15",
         "A",
         SPEEDS["A"][3:],
-        "The amplitude falls up to 345 rpm and then grows; four peaks become two, until at 500 rpm it is like a sine.",
+        "The amplitude falls up to 345 rpm and then grows. Four peaks become two, until at 500 rpm the motion is like a sine.",
         _fig_8_15,
         _TOGETHER,
     ),
@@ -616,7 +621,8 @@ TURNS = (
         TYPICAL,
         "The slider of rig 2 moves almost as a sine, with a phase that varies with the speed, from 300 to 1000 rpm.",
         _fig_8_18,
-        "The text names neither spring nor speeds of the typical oscillations: spring C below, at and above resonance.",
+        "The text names neither the spring nor the speeds of the typical oscillations. We show spring C below, at and above "
+        "resonance.",
     ),
 )
 

@@ -111,14 +111,15 @@ def judge_kinematics() -> tuple[Statement, ...]:
             "The releasing of some constraints in linkage mechanisms and treating them as inputs that may be controlled "
             "yield versatile and powerful mechanisms.",
             text("9.1, L6993"),
-            why="there is no measure of versatile and powerful",
+            why="there is no measure of *versatile* and *powerful*",
         ),
         Statement(
             "For example the introduction of a second input to a four bar linkage gives a variety of outputs thus making "
             "the linkage a multipurpose mechanism which may be adapted to generate a family of [output] motions.",
             text("9.1, L6997"),
-            "area between an ellipse and the curve of the links printed for path (b), mended, over that of the ellipse: three "
-            "of a family, the longer semi-axis 10 to 15 cm; five harmonics of the slider, a stroke of at most 25 cm (all ours)",
+            "area between an ellipse and the curve of the links printed for path (b), mended, relative to the area of the "
+            "ellipse. The family has three ellipses with longer semi-axes of 10 to 15 cm; the slider has five harmonics and "
+            "a stroke of at most 25 cm (all our choice)",
             f"{ALIKE:g}, the rule for *the same*",
             tuple(at_most(name, ALIKE, ellipse_error(axis_cm)) for name, axis_cm in ELLIPSES.items()),
         ),
@@ -126,9 +127,9 @@ def judge_kinematics() -> tuple[Statement, ...]:
             "[A] proper control of the slider enabled modifications and more accurate generation of outputs than could "
             "otherwise be obtained.",
             text("9.1, L7012"),
-            "error with the best two harmonics of the slider over that with the pivot fixed and the same links, as *otherwise* "
-            "is read: those printed, mended, for eight problems, and our best for seven; stroke and packaging machine as at "
-            "L5935",
+            "error with the best two harmonics of the slider, relative to that with the pivot fixed and the same links, as "
+            "we read *otherwise*: for the printed links, mended, in eight problems, and for our best links in seven. Stroke "
+            "and packaging machine are as at L5935",
             SEEN_FALL,
             (
                 at_most("printed links, the most of eight", 1.0 - ALIKE, max(error_ratios().values())),
@@ -139,26 +140,26 @@ def judge_kinematics() -> tuple[Statement, ...]:
             "However, the control of this second input produced changes that were limited by an envelope dictated by the "
             "linkage kinematics.",
             text("9.1, L7016"),
-            "area of path (b) that lies farther from the crank shaft than l2 + r, the reach of its printed links with any "
-            "motion of the slider",
-            "more than 0.01 cm2, above the error of the area",
+            "area of that part of path (b) which lies farther from the crank shaft than l2 + r, the reach of its printed "
+            "links with any motion of the slider",
+            "more than 0.01 cm2, which exceeds the error of the area",
             (at_least("out of reach", 0.01, out_of_reach(), "cm2"),),
         ),
         Statement(
             "Therefore it was logical firstly to find the linkage that would approximately generate the desired output and "
             "then secondly to introduce a second input and control it for more accurate generation.",
             text("9.1, L7020"),
-            why="it is a choice; no other order is tried",
+            why="this is a choice; no other order is tried",
         ),
         Statement(
             "As a result an optimisation method was developed, the output of which gave a planar linkage that minimised the "
             "errors involved in function or path generation.",
             text("9.1, L7026"),
-            f"error of the {len(ratios)} printed linkages whose error the thesis states, mended, over the least that we find "
-            "within our limits, see the head of chapter VI",
+            f"error of the {len(ratios)} printed linkages whose error the thesis states, mended, relative to the least that "
+            "we find within our limits (see the head of chapter VI)",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
             tuple(
-                at_most(name, 1.0 + ALIKE, ratio, why="the others do not have the least error")
+                at_most(name, 1.0 + ALIKE, ratio, why="the other linkages do not have the least error")
                 for name, ratio in ratios.items()
             ),
         ),
@@ -166,21 +167,24 @@ def judge_kinematics() -> tuple[Statement, ...]:
             "The method could be applied to any planar linkage and was implemented as a package of subroutines for general "
             "use.",
             text("9.1, L7030"),
-            why="it is applied to four-bars and to one five-bar; that it is a package tells what was done (appendix 5)",
+            why="it is applied to four-bars and to one five-bar. That it is a package only tells what was done (appendix 5)",
         ),
         Statement(
             "The optimisation method was applied to a variety of examples and in most cases produced satisfactory results.",
             text("9.1, L7037"),
-            "*satisfactory* is read as: the printed linkage has the error that the thesis states. Number of them whose error "
-            f"is at most {1.0 + ABOUT:g} times that, of {len(shares)}: {len(ratios)} of chapter VI, and two with the series of "
-            "Figs 7.11 and 7.12, mended and in the best of their readings",
+            "*satisfactory* is read as: the printed linkage has the error that the thesis states. Number of linkages whose "
+            f"error is at most {1.0 + ABOUT:g} times the stated one, of {len(shares)}: {len(ratios)} of chapter VI, and two "
+            "with the series of Figs 7.11 and 7.12. They are mended, and the series are in the best of their readings",
             f"more than half, as *most* says; {ABOUT:g}, the rule for *about*",
             (
                 at_least("keep their error", 0.5 * len(shares), kept),
                 Case(
                     label="the other examples",
                     computed=None,
-                    why="for the packaging machine, series 1 of chapter VII and the others of 7.3.2 (L5935) no error is stated",
+                    why=(
+                        "no error is stated for the packaging machine, for series 1 of chapter VII and for the others of "
+                        "7.3.2 (L5935)"
+                    ),
                 ),
             ),
         ),
@@ -194,20 +198,21 @@ def judge_equations() -> tuple[Statement, ...]:
             "The multipliers were associated with the pin forces and suitable methods of solution of the equations of "
             "motion were discussed.",
             text("9.1, L7049"),
-            "multipliers of (3.1) less the force at pin C and the crank torque by our equations of motion, which have no "
-            "multipliers, relative to the greatest; the most of those at Fig 3.1",
+            "multipliers of (3.1) minus the force at pin C and the crank torque by our equations of motion, which have no "
+            "multipliers, relative to the greatest value; the greatest difference of those at Fig 3.1",
             "1e-9, above rounding errors",
             (at_most("multipliers", 1e-9, max(case.computed or 0.0 for case in judge_multipliers())),),
-            "what is said of the methods is judged at L1334 to 1407",
+            "what is said about the methods is judged at L1334 to 1407",
         ),
         Statement(
             "It was found that, when performing the numerical integrations, it was better if all the derivatives of the "
             "generalised coordinates used in the multipliers method were integrated.",
             text("9.1, L7053"),
             "*better* is read as in 3.1 (L1744): the closure of the loop then shows the error. Greatest failure of closure "
-            "over the greatest error of u, in 0.5 s by Hamming's method with a constant step, at 420 rpm and in a launch with "
-            "T0 = 1e8 dyn.cm, as at L1744",
-            "1 to 100, ours as there: the check shows an error, and no more than a hundred times as large as it is",
+            "divided by the greatest error of u, in 0.5 s by Hamming's method with a constant step, at 420 rpm and in a "
+            "launch with T0 = 1e8 dyn.cm, as at L1744",
+            "1 to 100, our choice as there: the closure must show the error, and must not be more than a hundred times as "
+            "large",
             judge_closure(),
         ),
     )
@@ -226,9 +231,10 @@ def judge_constant_speed() -> tuple[Statement, ...]:
         Statement(
             "It was found that the spring stiffness had little effect on the torque required to drive the mechanism.",
             text("9.1, L7067"),
-            "steady torque with the softest and the stiffest spring, k = 5e5 and 2e6 dyn/cm, 420 rpm: greatest distance of the "
-            "curves on a graph, square to them, as at L1995 but over the whole turn; greatest difference at the same crank "
-            "angle, relative to the greatest size of the torque with the softest",
+            "steady torque with the softest and the stiffest spring, k = 5e5 and 2e6 dyn/cm, at 420 rpm. First the greatest "
+            "distance of the curves on a graph, perpendicular to them, as at L1995 but over the whole turn; then their "
+            "greatest difference at the same crank angle, relative to the greatest size of the torque with the softest "
+            "spring",
             f"{SMALL:g}, the rule for *small*, as *little effect* says",
             (at_most("on the graph", SMALL, seen), at_most("at the same crank angle", SMALL, differs)),
             "where the curves are steep they differ more at the same angle",
@@ -238,8 +244,8 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             "transient followed by periodic oscillations of period [2 pi] of the crank angle.",
             text("9.1, L7071"),
             "greatest distance of u in the first turn from the steady motion; difference of u from one turn of the crank to "
-            "the next after 8 s; both over the range of the steady motion, 420 rpm",
-            f"{ALIKE:g}, the rule for *steady*: more for a transient, at most that for periodic oscillations",
+            "the next after 8 s; both relative to the range of the steady motion, at 420 rpm",
+            f"{ALIKE:g}, the rule for *steady*: more than this for a transient, at most this for periodic oscillations",
             (
                 at_least("transient, least of the springs", ALIKE, min(starts)),
                 *(
@@ -252,11 +258,11 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             "However, when the spring was eliminated the slider moved with periodic oscillations superimposed on a linear "
             "shift in its position thus making the linkage fall into a collinear configuration.",
             text("9.1, L7077"),
-            "greatest change of the oscillation about the drift from turn to turn, as at L1907, and distance of u at the ends "
-            "of the turns from a line, as at L1911; turns until coupler and rocker are within "
-            f"{degrees(asin(COLLINEAR_SINE)):.0f} deg of a line (ours)",
-            f"{ALIKE:g}, the rule for *steady* and *linear*; {FEWEST_TURNS} turns, two of the transient and two to compare; "
-            f"{MOST_TURNS}, the turns that were run",
+            "greatest change of the oscillation about the drift from turn to turn, as at L1907; distance of u at the ends "
+            "of the turns from a line, as at L1911; number of turns until coupler and rocker are within "
+            f"{degrees(asin(COLLINEAR_SINE)):.0f} deg of a straight line (our choice)",
+            f"{ALIKE:g}, the rule for *steady* and *linear*; {FEWEST_TURNS} turns, two for the transient and two to compare; "
+            f"{MOST_TURNS}, the number of turns that were run",
             (
                 at_least(
                     f"oscillation and shift; mu = {plain(DAMPINGS[0])} dyn.s/cm, turns until collinear",
@@ -304,10 +310,10 @@ def judge_launches() -> tuple[Statement, ...]:
             "the input torque became smaller than the load offered by the linkage after which the slider executed periodic "
             "oscillations in [2 pi] of the crank angle.",
             text("9.1, L7083"),
-            "launches of Figs 3.6 and 3.9: crank angle of the greatest speed while the torque acts, the most; crank angle from "
-            "one maximum of the slider to the next after the torque, for the first two, and mean for the last three within 1 s "
-            "(ours), the farthest from 360 deg",
-            f"below 1 rad, where the torque ends; {ABOUT_DEG:g} deg, the rule for *about*, as the oscillations decay",
+            "launches of Figs 3.6 and 3.9: crank angle at which the speed is greatest while the torque acts, the greatest "
+            "of the launches. Then the crank angle from one maximum of the slider to the next after the torque, for the "
+            "first two maxima, and the mean for the last three within 1 s (our choice), each the farthest from 360 deg",
+            f"below 1 rad, where the torque ends; {ABOUT_DEG:g} deg, the rule for *about*, since the oscillations decay",
             (
                 at_most("greatest speed", 1.0, fastest, "rad"),
                 *(
@@ -326,15 +332,16 @@ def judge_launches() -> tuple[Statement, ...]:
         Statement(
             "The oscillations, however, decayed due to the viscous dissipation of energy in the slider guide.",
             text("9.1, L7092"),
-            "range of u over a turn after the launches of Figs 3.8 and 3.10, from the third turn on, as a transient comes "
-            f"first: its mean in the later half of the turns within {FREE:g} s (ours) over that in the earlier; the most with "
-            "the damper, the least without, where the links do not become collinear",
-            f"with the damper {SEEN_FALL}; without it at least that",
+            "range of u over a turn after the launches of Figs 3.8 and 3.10, from the third turn on, since a transient "
+            f"comes first: its mean in the later half of the turns within {FREE:g} s (our choice), relative to that in the "
+            "earlier half. The greatest with the damper is listed, and the least without it, for launches in which the "
+            "links do not become collinear",
+            f"with the damper {SEEN_FALL}; without it no such fall",
             (
                 at_most("with the damper, five launches", 1.0 - ALIKE, damped),
                 at_least("without, three launches", 1.0 - ALIKE, undamped),
             ),
-            "the slowest to fall is that with T0 = 1e8 dyn.cm and k = 1e6 dyn/cm, whose range stays the same for ten turns",
+            "the slowest decay is that with T0 = 1e8 dyn.cm and k = 1e6 dyn/cm, whose range stays the same for ten turns",
         ),
     )
 
@@ -356,9 +363,9 @@ def judge_experiment() -> tuple[Statement, ...]:
             "The assumptions were found to be reasonable and good agreement between theory and experiment was found in the "
             "resonance behaviour.",
             text("9.1, L7145"),
-            "two assumptions of chapter IV: error of the amplitude by its linear equation, corrected, relative to that by the "
-            "full equations; greatest of the harmonics 3 to 6, which it ignores, over the greater of the first two; the most "
-            "of springs C and D, 300 to 1000 rpm (L6812) in tens",
+            "two assumptions of chapter IV: error of the amplitude by its linear equation, corrected, relative to that by "
+            "the full equations; greatest of the harmonics 3 to 6, which it ignores, relative to the greater of the first "
+            "two. The greatest values for springs C and D, 300 to 1000 rpm (L6812) in steps of 10",
             f"{SMALL:g}, the rule for *negligible*",
             (
                 at_most("error of the linear equation", SMALL, error),

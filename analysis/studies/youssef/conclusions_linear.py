@@ -33,7 +33,7 @@ CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
 LARGE = 0.05
 #: Words for the equation behind the numbers of chapters IV and V, for the speeds and for the dampers.
 RIGHT = "right linear equation"
-SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05, closer at the resonances (ours)"
+SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05, closer at the resonances (our choice)"
 DAMPERS_WORDS = f"omega_c = {WEAK:g} and {STRONG:g} 1/s (Fig 4.6)"
 SIGN = "none, the sign decides"
 
@@ -146,9 +146,9 @@ def judge_introduction() -> tuple[Statement, ...]:
         Statement(
             "The instability, however, disappeared completely by addition of a small value of damping.",
             text("8.0, L6063"),
-            "omega_c that removes the regions near twice, once, two thirds and half of the natural frequency, over the "
-            "critical one, 2 omega_k: the most of I4 = 0.25 to 2, of l2/l4 = 0.01 to 0.1 at I4 = 1 and of l3/l4 = 0.8 to 1.2 "
-            f"at I4 = 2; estimated by the {RIGHT} from their widths without a damper",
+            "omega_c that removes the regions near twice, once, two thirds and half of the natural frequency, relative to "
+            "the critical value 2 omega_k: the greatest for I4 = 0.25 to 2, for l2/l4 = 0.01 to 0.1 at I4 = 1 and for l3/l4 "
+            f"= 0.8 to 1.2 at I4 = 2; estimated by the {RIGHT} from the widths without a damper",
             f"{SMALL:g}, the rule for *small*",
             tuple(at_most(name, SMALL, share) for name, share in removing.items()),
             "the slider's fall beyond the zeroth boundary is judged at L3952",
@@ -177,9 +177,10 @@ def _on_resonance() -> tuple[Statement, ...]:
         Statement(
             "Results for a short crank showed similarity to a damped second order linear system behaviour.",
             text("9.1, L7102"),
-            "slider's amplitude, by the first harmonic and by both, less that of one damped mass on a spring under an "
-            "unbalance, relative to it; means of M and K, the unbalance that fits the first harmonic on the average; the most "
-            f"of I4 = 0.5, 1 and 1.5, {DAMPERS_WORDS}, {SPEEDS_WORDS}; {RIGHT}",
+            "slider's amplitude, by the first harmonic and by both, minus that of a single damped mass on a spring under an "
+            "unbalance, relative to the latter. The single mass has the means of M and K and the unbalance that fits the "
+            f"first harmonic on average. The greatest difference for I4 = 0.5, 1 and 1.5, {DAMPERS_WORDS}, {SPEEDS_WORDS}; "
+            f"{RIGHT}",
             f"{ABOUT:g}, the rule for *similar*",
             judge_oscillator(),
             "near half the natural frequency the second harmonic, judged next, has its own resonance",
@@ -187,8 +188,8 @@ def _on_resonance() -> tuple[Statement, ...]:
         Statement(
             "The major harmonic in the solution was the first harmonic; the remaining ones were almost negligible.",
             text("9.1, L7104"),
-            "second harmonic over the first, and greatest of the third to fifth over it: greatest over greatest, and at the "
-            "same speed; speeds, I4 and dampers of the row before, the most",
+            "second harmonic, and greatest of the third to fifth, relative to the first: the greatest values of each, and "
+            "the values at the same speed. The largest ratio is listed, for speeds, I4 and dampers of the row before",
             f"{SMALL:g}, the rule for *negligible*",
             (
                 at_most("second, greatest over greatest", SMALL, max(second[x].max() / first[x].max() for x in each)),
@@ -204,15 +205,15 @@ def _on_resonance() -> tuple[Statement, ...]:
                     max((higher / one).max() for one, _, *higher in five.values()),
                 ),
             ),
-            "near half and a third of the natural frequency the second and the third have their own resonances",
+            "near half and a third of the natural frequency the second and the third harmonic have their own resonances",
         ),
         Statement(
             "It was found that the increase in the rocker inertia decreased the natural frequency linearly, increased the "
             "amplitude of vibrations and widened the region of resonance.",
             text("9.1, L7110"),
             f"resonant speeds without a damper, I4 = {_listed(RATIOS)}: distance from a line, relative to their range, and "
-            "greatest growth; least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of the range of speeds "
-            f"with u/l4 above {LARGE:g} (ours), {DAMPERS_WORDS}; {RIGHT}",
+            "greatest growth with I4. Then the least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of "
+            f"the range of speeds with u/l4 above {LARGE:g} (our choice), {DAMPERS_WORDS}; {RIGHT}",
             f"{ALIKE:g}, the rule for *linear*; {SIGN}",
             (
                 at_most("distance from a line", ALIKE, bend),
@@ -220,7 +221,7 @@ def _on_resonance() -> tuple[Statement, ...]:
                 at_least("growth of the amplitude u/l4", 0.0, np.diff(tops).min()),
                 at_least("growth of the range", 0.0, np.diff(wide).min(), "rad/s"),
             ),
-            f"the range above half of the peak shrinks: at {STRONG:g} 1/s from {half[0]:.2f} to {half[-1]:.2f} rad/s",
+            f"but the range above half of the peak shrinks: at {STRONG:g} 1/s from {half[0]:.2f} to {half[-1]:.2f} rad/s",
         ),
     )
 
@@ -236,10 +237,11 @@ def _on_stability() -> tuple[Statement, ...]:
             "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only, where [wn is "
             "the] natural frequency.",
             text("9.1, L7116"),
-            "region near twice the natural frequency: width in lambda_k^2 over its middle, the most; speed in its middle over "
-            "this frequency, with the mean mass, the farthest from 2; for *only*, width of the region at the natural frequency "
-            f"over that of this one, the least; I4 = 0.25 to 2, without a damper, {RIGHT}",
-            f"{SMALL:g}, the rule for *small*, for *narrow* too; {ABOUT:g} of 2, the rule for *near*, for *vicinity* too",
+            "region near twice the natural frequency: greatest width in lambda_k^2 relative to its middle; speed in its "
+            "middle relative to this frequency, with the mean mass, the farthest from 2. For *only*, the least width of the "
+            f"region at the natural frequency, relative to that of this region. I4 = 0.25 to 2, without a damper, {RIGHT}",
+            f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {ABOUT:g} of 2, the rule for *near*, which we "
+            "use for *vicinity* too",
             (at_most("width", SMALL, narrow), *judge_single_region()),
         ),
         Statement(
@@ -247,8 +249,8 @@ def _on_stability() -> tuple[Statement, ...]:
             "length and increase of output inertia.",
             text("9.1, L7120"),
             "*instability* is read as the width of the first region in lambda_k^2, which Figs 5.1 to 5.3 show: its least "
-            f"growth between neighbours of l2/l4 = {_listed(CRANKS)} at I4 = 1, of l3/l4 = {_listed(COUPLERS[::-1])} at I4 = "
-            f"2, and of I4 = {_listed(RATIOS)}; without a damper, {RIGHT}",
+            f"growth between neighbouring values of l2/l4 = {_listed(CRANKS)} at I4 = 1, of l3/l4 = "
+            f"{_listed(COUPLERS[::-1])} at I4 = 2, and of I4 = {_listed(RATIOS)}; without a damper, {RIGHT}",
             SIGN,
             (
                 at_least("longer crank", 0.0, np.diff(by_crank).min()),

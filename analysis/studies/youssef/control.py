@@ -195,11 +195,12 @@ def compute() -> StudyResult:
     return StudyResult(
         number=NUMBER,
         claim="The slider may be driven off-line, with feedback to a stored motion, or adaptively in trial cycles.",
-        assignment="The thesis computes none of them. Ours: steel bars of 20 by 5 mm, "
-        f"a slider of {m.model.slider_mass:.1f} kg with a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction, at "
-        f"{SPEED * 30.0 / pi:.0f} rpm, moved by the best two harmonics of Fig 7.11; feedback every {1e3 * PERIOD:g} ms with a "
-        f"bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's model: twice the friction, coupler and "
-        f"slider a tenth heavier, a load of ({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
+        assignment="The thesis computes none of them. In our example the links are steel bars of 20 by 5 mm, and a slider "
+        f"of {m.model.slider_mass:.1f} kg has a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction. It "
+        f"moves at {SPEED * 30.0 / pi:.0f} rpm by the best two harmonics of Fig 7.11, with feedback every "
+        f"{1e3 * PERIOD:g} ms and a bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's "
+        "model: it has twice the friction, coupler and slider are a tenth heavier, and there is a load of "
+        f"({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
         columns=pad_columns(columns),
         statements=(*judge_off_line(runs["feed-forward"], cams), *judge_on_line(runs["feedback"]), *judge_strategy()),
     )
@@ -217,8 +218,8 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
             text("7.1.1 (a), L5301-5309"),
             "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
-            "limit: least radius of curvature of the path of the roller's centre where it is convex; for a Scotch yoke, "
-            "weighted error of the rocker function with one harmonic over that with the pivot fixed",
+            "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a Scotch "
+            "yoke, the weighted error of the rocker function with one harmonic, relative to that with the pivot fixed",
             f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
             (
                 *(at_least(f"cam of {name}", ROLLER, c.curvature, "cm") for name, c in cams.items()),
@@ -236,9 +237,9 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
             "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
             text("7.1.1 (b), L5311-5319"),
-            "range of u over a steady turn of Table 3.1, k = 1e6 dyn/cm, at 420 rpm, where the slider has no drive but spring, "
-            "damper and the forces of the links, over l4",
-            f"more than {READ:g}, what a graph can be read to",
+            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm at 420 rpm. Only spring, "
+            "damper and the forces of the links move the slider",
+            f"more than {READ:g}, the accuracy to which a graph can be read",
             (
                 at_least("spring, continuous", READ, spring_range()),
                 Case(label="latch, intermittent", computed=None, why="no example is given"),
@@ -250,8 +251,9 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
             "reproduction of a sufficiently accurate cyclic variation may be difficult.",
             text("7.1.1 (c), L5321"),
-            "rms deviation of the slider, over its stroke, on the machine under the force that the controller's model needs, "
-            f"without feedback; {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns, until the links cannot be joined",
+            "rms deviation of the slider, relative to its stroke, on the machine without feedback, under the force that the "
+            f"controller's model needs; over {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns, until the links "
+            "cannot be joined",
             f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
             (
                 at_least("no feedback", ALIKE, relative_deviation(open_loop)),
@@ -284,7 +286,7 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
             "the actual motion is required to adhere by means of feedback.",
             text("7.1.2, L5336"),
             f"the same deviation on the same machine with feedback to the stored motion, over {TURNS:g} turns",
-            f"{ALIKE:g}, the rule for *the same*; one example is enough: the sentence describes what feedback can do",
+            f"{ALIKE:g}, the rule for *the same*; one example is enough, since the sentence describes what feedback can do",
             (at_most("feedback", ALIKE, relative_deviation(closed)),),
         ),
         Statement(
@@ -316,7 +318,8 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
             "considerations into its structure.",
             text("7.3.1, L5853"),
             "weighted error of the rocker function over the last turn of a run of the machine with feedback: the least in "
-            f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, over that at rest, where it begins",
+            f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, relative to that with the slider at "
+            "rest, where the simplex begins",
             f"{SEEN_FALL}; one example is enough for *may be*",
             (at_most("search on the machine", 1.0 - ALIKE, least / at_rest),),
         ),
@@ -324,13 +327,13 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
             "With the variational method, any change in the operating conditions require a recalculation of optimum "
             "conditions.",
             text("7.3.1, L5871-5873"),
-            "*operating conditions* is read as load and speed: error as in the row before, with feedback to the stored motion "
-            "of Fig 7.11, in place of a variational one (L5915), over that before the change; the least of three: three times "
-            "the load, half and twice the speed",
-            f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires none is enough against *any*",
+            "*operating conditions* is read as load and speed. Error as in the row before, with feedback to the stored "
+            "motion of Fig 7.11 in place of a variational one (L5915), relative to the error before the change. The least "
+            "for three changes: three times the load, half the speed, and twice the speed",
+            f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires no recalculation refutes *any*",
             (at_least("the least", 1.0 + ALIKE, min(loaded, slower, faster)),),
-            f"at half the speed {slower:.3f}, at twice {faster:.3f}; a motion calculated again would be the same, as no "
-            "equation of the method has load or speed",
+            f"at half the speed the ratio is {slower:.3f}, at twice the speed {faster:.3f}. A motion calculated again would "
+            "be the same, since no equation of the method contains load or speed",
         ),
         Statement(
             "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
@@ -354,8 +357,8 @@ def judge_strategy() -> tuple[Statement, ...]:
             "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
             "five bar loop.",
             text("7.4, L6013"),
-            "error with the slider moved by its best two harmonics over that with the pivot fixed, the printed links kept, "
-            "mended",
+            "error with the slider moved by its best two harmonics, relative to that with the pivot fixed, for the printed "
+            "links, mended",
             SEEN_FALL,
             (
                 at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),

@@ -195,16 +195,16 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "lambda_c^2 k0^2] in (5[.]30).",
             text("5.2.1, L3628-3635"),
             f"regions 1 to 4 of (5.29) with omega_c = {STATED:g} 1/s and without a damper: shift of the middle in lambda_k^2 "
-            "k0 over the stated quantity; shift over lambda_k^2; width over that without. The farthest of I4 = 0.5, 1 and "
-            "1.5; right linear equation",
+            "k0 divided by the stated quantity; shift divided by lambda_k^2; width divided by that without a damper. The "
+            "largest deviation of I4 = 0.5, 1 and 1.5 is listed; right linear equation",
             f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*",
             judge_shifts(),
         ),
         Statement(
             "As would be expected the region is decreased in width as [omega_c] is increased.",
             text("5.3.2, L3915-3917"),
-            "growth of the width in lambda_k^2 from one damper to the next, up to that which removes the region, the greatest "
-            "of I4 = 0.5, 1, 1.5 and 2; true periodic motion",
+            "greatest growth of the width in lambda_k^2 from one damper to the next, up to the damper that removes the "
+            "region, at I4 = 0.5, 1, 1.5 and 2; for the true periodic motion",
             SIGN,
             (at_most("", 0.0, growth),),
         ),
@@ -212,8 +212,8 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
             "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
             text("5.3.2, L3917-3921"),
-            "growth of the I4 at which the region begins, from one damper to the next, the least (*to the right* on a plot "
-            "over I4, L3910); omega_c that removes the region, the most up to I4 = 1.5; true periodic motion",
+            "least growth of the I4 at which the region begins, from one damper to the next (*to the right* on a plot over "
+            "I4, L3910); greatest omega_c that is needed to remove the region up to I4 = 1.5; for the true periodic motion",
             "none: the sign decides, and whether the region is removed",
             (
                 at_least("growth", 0.0, np.diff(tips).min()),
@@ -224,9 +224,10 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
             "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
-            "omega_c that removes the region, the most over sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01 and over sigma3 = "
-            "0.8 to 1.2 in steps of 0.025; estimated from the width without a damper by the right linear equation",
-            "none: it is removed or it is not",
+            "greatest omega_c that is needed to remove the region, over sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01, "
+            "and over sigma3 = 0.8 to 1.2 in steps of 0.025; estimated from the width without a damper by the right linear "
+            "equation",
+            "none: the region is removed or it is not",
             (
                 at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
                 at_most(
@@ -245,9 +246,9 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
             "making the linkage under study completely stable for all ranges of speeds.",
             text("5.3.3 c, L3952-3958"),
-            "growth of the width as above; by the right linear equation at I4 = 1.5: omega_c that removes regions 1 to 4, "
-            "estimated from their widths; greatest multiplier beyond the zeroth boundary, at "
-            f"{fast:.0f} rad/s, with {STATED:g} 1/s (L3921) and a thousand times as much",
+            "growth of the width as above. Then, by the right linear equation at I4 = 1.5: omega_c that removes regions 1 "
+            f"to 4, estimated from their widths; greatest multiplier beyond the zeroth boundary, at {fast:.0f} rad/s, with "
+            f"{STATED:g} 1/s (L3921) and with a thousand times as much",
             "none: the sign and the stability decide",
             (
                 at_most("growth of the width", 0.0, growth),
@@ -257,7 +258,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
                     for omega_c in (STATED, 1e3 * STATED)
                 ),
             ),
-            "beyond the zeroth boundary the slider falls away, which a damper slows but does not stop",
+            "beyond the zeroth boundary the slider falls away; a damper slows it but does not stop it",
         ),
     )
 
@@ -282,26 +283,26 @@ def judge_determinant() -> tuple[Statement, ...]:
         Statement(
             "The values of [omega] and s2 that satisfy equations (5.35) determine the boundaries of the unstable regions.",
             text("5.2.2, eqs (5.33) to (5.35), L3717-3719"),
-            "greatest real part s1 of Lambda outside the first region: half a width from it and at lambda_k^2 = 0.2 and 0.35, "
-            "I4 = 0.5, 1 and 1.5, right linear equation. Where it is 0, some s2 satisfies (5.35)",
+            "greatest real part s1 of Lambda outside the first region: half a width away from it, and at lambda_k^2 = 0.2 "
+            "and 0.35, for I4 = 0.5, 1 and 1.5; right linear equation. Where s1 is 0, some s2 satisfies (5.35)",
             "below 0 by more than 1e-9, above rounding errors",
             tuple(at_most(name, -1e-9, growth_outside_region(omega_c)) for name, omega_c in dampers.items()),
-            "without a damper s1 is 0 at every stable speed, not at the boundaries alone",
+            "without a damper s1 is 0 at every stable speed, not only at the boundaries",
         ),
         Statement(
             "For a particular mechanism the method is capable of giving all the boundaries of the unstable regions without "
             "any extra work.",
             text("5.2.2, L3730-3734"),
-            "boundaries by (5.35) cut after the ninth term (L3930), with the coefficients to their second harmonic, as in "
-            "(4.29), and with all harmonics, less those without any cut, over the region's width; the four regions that nine "
-            "terms have; right linear equation, divided by M as (5.27), I4 = 1, without a damper",
+            "boundaries by (5.35) cut after the ninth term (L3930) minus those without any cut, relative to the region's "
+            "width. The coefficients have two harmonics, as in (4.29), or all harmonics. The four regions that nine terms "
+            "have; right linear equation, divided by M as (5.27), I4 = 1, without a damper",
             f"{SMALL:g}, the rule for *small*",
             tuple(
                 at_most(f"region {n}; {name}", SMALL, x)
                 for name, harmonics in (("as in (4.29)", LISTED_HARMONICS), ("all harmonics", ALL_HARMONICS))
                 for n, x in determinant_errors(harmonics).items()
             ),
-            "to derive more harmonics, which the third region needs, or more terms, which the fourth does, is extra work",
+            "it does need extra work: more harmonics for the third region, and more terms for the fourth",
         ),
         Statement(
             "The computer orientated method provided a fast method for solving the stability problem.",
@@ -312,19 +313,19 @@ def judge_determinant() -> tuple[Statement, ...]:
             "The computer orientated method gave results which are in good agreement with the perturbation method; "
             "see the outer boundary of fig. (5.4) and fig. (5.1).",
             text("5.3.3 e, L3964-3968"),
-            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over the least "
-            "scale of their graph, from 1/4 at I4 = 0 to the highest at I4 = 1.5; right linear equation, and listings of "
-            "appendices 4 and 3; the greatest of I4 = 0.5, 1 and 1.5",
-            f"{ALIKE:g}, for *good agreement* as for *the same*, and as at L6865",
+            "outer boundaries of the first region, those without a damper: by (5.35) minus by (5.16), relative to the least "
+            "scale of their graph, from 1/4 at I4 = 0 to the highest boundary at I4 = 1.5. Right linear equation, and "
+            "listings of appendices 4 and 3; the greatest difference of I4 = 0.5, 1 and 1.5",
+            f"{ALIKE:g}, the rule for *the same*, which we use for *good agreement* as at L6865",
             tuple(at_most(name, ALIKE, x) for name, x in apart.items()),
-            f"of the region's width the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
+            f"but relative to the region's width, the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
             listing("appendix 4, L8698"),
-            "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation of "
-            "the listing (its cut after nine terms does not change these digits) and by the true periodic motion",
-            "0.0005 1/s, to which the listing's value is found",
+            "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation "
+            "of the listing (its cut after nine terms does not change these digits) and for the true periodic motion",
+            "0.0005 1/s, the accuracy of the listing's value",
             (
                 near(
                     "",
@@ -333,7 +334,7 @@ def judge_determinant() -> tuple[Statement, ...]:
                     unit="1/s",
                 ),
             ),
-            "its regions are too wide (errata 2, 16, 17, 20)",
+            "the listing's regions are too wide (errata 2, 16, 17, 20)",
         ),
     )
 
@@ -353,8 +354,8 @@ def compute() -> StudyResult:
     return StudyResult(
         number="5.4",
         claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
-        assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are ours; the damper that removes the region is "
-        "found at I4 = 0.25 to 2 in steps of 0.25.",
+        assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are our choice. The damper that removes the "
+        "region is found at I4 = 0.25 to 2 in steps of 0.25.",
         columns=pad_columns(columns),
         statements=(*judge_damper(charts), *judge_determinant()),
     )

@@ -37,7 +37,7 @@ LONG_STEP = 1e-2
 #: Torque of the launch that is compared (N.m), and greatest relative rounding error of a solution.
 TORQUE, ROUNDING = 10.0, 1e-9
 #: Why the closure does not show the error of a launch.
-KINK = "the step in which the torque of the launch ends leaves an error along the motion, with the loop closed"
+KINK = "the step in which the torque of the launch ends leaves an error along the motion, while the loop stays closed"
 #: Step (s) with which appendix 1 begins: there the estimate of Hamming's method is judged.
 STEP = 1e-3
 #: Errors (m) with which this estimate is tested: of the start, and the unit to which the back values are rounded.
@@ -405,19 +405,19 @@ def compute() -> StudyResult:
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
     return StudyResult(
         number="3.1",
-        claim="The multipliers are the pin forces; with all second derivatives integrated, the closure of the loop "
-        "tells the error of the integration at constant speed.",
+        claim="The multipliers are the pin forces. If all second derivatives are integrated at constant speed, the closure "
+        "of the loop shows the error of the integration.",
         columns=columns,
         statements=(
             Statement(
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
-                "multipliers by (3.1), (3.8) and (3.10), less crank torque and force at C by our equations of motion, which "
-                "have none, relative to the greatest of each; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, 0.3 s from u = u' "
-                "= 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
+                "multipliers by (3.1), (3.8) and (3.10), minus crank torque and force at C by our equations of motion, "
+                "which have no multipliers, relative to the greatest value of each. Table 3.1 with k = 1e6 dyn/cm and mu = "
+                "3e4 dyn.s/cm, 0.3 s from u = u' = 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
                 f"{ROUNDING:g}, above rounding errors",
                 judge_multipliers(),
-                "where our scan differs, (3.8) has the minus of l2 cos theta2 as in (4.10), and (3.10) has k for k2",
+                "where our scan differs, we read (3.8) with the minus of l2 cos theta2 as in (4.10), and (3.10) with k for k2",
             ),
             *_closure_statements(),
             *_one_step_statements(),
@@ -431,7 +431,7 @@ def _step(step: float) -> str:
 
 
 def _closure_statements() -> list[Statement]:
-    """Judge section 3.1: what the closure of the loop shows of the error."""
+    """Judge section 3.1: whether the closure of the loop shows the error."""
     found, long, label = (
         {_step(step): integrate_both(step) for step in STEPS},
         integrate_both(LONG_STEP),
@@ -443,10 +443,11 @@ def _closure_statements() -> list[Statement]:
             "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
             "closure.",
             text("3.1, L1744-1748; the same in L1772-1782"),
-            "greatest failure of closure over greatest error of u, in 0.5 s, all second derivatives integrated by Hamming's "
-            "method with a constant step; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, at 420 rpm and in a launch with T0 = "
-            "1e8 dyn.cm; for *debugging*, at 420 rpm, by Runge-Kutta's method with a slip of ours, its last stage at mid-step",
-            "1 to 100, ours: the check shows an error, and no more than a hundred times as large as it is",
+            "greatest failure of closure divided by the greatest error of u, in 0.5 s. All second derivatives are "
+            "integrated by Hamming's method with a constant step, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm, "
+            "at 420 rpm and in a launch with T0 = 1e8 dyn.cm. For *debugging*, the same at 420 rpm by Runge-Kutta's method "
+            "with a slip that we put in: its last stage is at mid-step",
+            "1 to 100, our choice: the closure must show the error, and must not be more than a hundred times as large",
             (
                 *judge_closure(),
                 Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0),
@@ -466,9 +467,11 @@ def _closure_statements() -> list[Statement]:
             "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
             "to indicate whether the solution is accurate.",
             text("3.1, L1763-1772"),
-            f"greatest error of u by the second approach as in the row before, with a step of {1e3 * LONG_STEP:g} ms, ours: "
-            "over the range of u, over the failure of closure, and over the greatest change of u when the step is halved",
-            f"more than {SMALL:g}, the rule for *small*; more than 100, ours as above; one simple check refutes *no*",
+            f"greatest error of u by the second approach as in the row before, with a step of {1e3 * LONG_STEP:g} ms (our "
+            "choice). It is divided by the range of u, by the failure of closure, and by the greatest change of u when the "
+            "step is halved",
+            f"more than {SMALL:g}, the rule for *small*; more than 100, our choice as above, for the two checks. One simple "
+            "check that shows the error refutes *no*",
             (
                 at_least(f"large error; {label}", SMALL, long.errors[1] / travel),
                 at_least(f"not seen in the closure; {label}", 100.0, long.errors[1] / long.unseen),
@@ -484,9 +487,10 @@ def _closure_statements() -> list[Statement]:
             "This [to integrate all the second order derivatives and bound the errors in loop closure, before the second "
             "approach is taken] will ensure that the integration method is reliable and leads to accurate results.",
             text("3.1, L1796-1798"),
-            "greatest error of u by the second approach over the greatest failure of closure by the first with the same step; "
-            "Hamming's method, at 420 rpm and in the launch, two of *the coming solutions* (L1784)",
-            "at most 1, ours: what bounds the failure of closure then bounds the error",
+            "greatest error of u by the second approach divided by the greatest failure of closure by the first approach "
+            "with the same step. Hamming's method, at 420 rpm and in the launch, which are two of *the coming solutions* "
+            "(L1784)",
+            "at most 1, our choice: then a bound on the failure of closure also bounds the error",
             (
                 *(at_most(name, 1.0, run.errors[1] / run.gap.max()) for name, run in found.items()),
                 *(
@@ -517,22 +521,23 @@ def _one_step_statements() -> list[Statement]:
             "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
             "errors; this makes them highly susceptible to numerical instabilities ...",
             text("2.4, L1334-1340"),
-            "factor between the greatest error of u and its estimate, the change when the step is halved over 1 - 1/16: second "
-            "approach, classical method, 420 rpm, greatest of steps of 4, 2, 1 and 0.5 ms; greatest stable step for y'' = -y, "
-            "ours, over that of Hamming's method",
-            "more than 2, ours: an estimate within a factor of 2 is of use; at most 1: *highly* is read as more than Hamming's",
+            "factor between the greatest error of u and its estimate, which is the change when the step is halved, divided "
+            "by 1 - 1/16. Second approach, classical method, 420 rpm, the greatest factor for steps of 4, 2, 1 and 0.5 ms. "
+            "Then the greatest stable step for y'' = -y (our example) divided by that of Hamming's method",
+            "more than 2, our choice, since an estimate within a factor of 2 is useful; at most 1, since *highly* is read "
+            "as more than Hamming's method",
             (
                 at_least(
                     "lack of an estimate",
                     2.0,
                     halved,
-                    why="halving the step estimates the error, for three times the evaluations",
+                    why="halving the step estimates the error, at the cost of three times the evaluations",
                 ),
                 at_most(
                     "susceptible to instabilities",
                     1.0,
                     classical / hamming,
-                    why=f"it is stable up to steps of {classical:.1f}, Hamming's up to {hamming:.2f}",
+                    why=f"it is stable up to steps of {classical:.1f}, Hamming's method up to {hamming:.2f}",
                 ),
             ),
         ),
@@ -562,11 +567,15 @@ def _one_step_statements() -> list[Statement]:
             "For example, to obtain a solution equivalent to a fourth order Runge-kutta method we need to evaluate the "
             "fourth derivative of the function [Phi].",
             text("2.4, L1364-1370"),
-            "order of the error of a Taylor series of y' = Phi with the derivatives of Phi up to the third; Phi = -y, ours, up "
-            "to t = 1, steps of 0.1 and 0.05",
-            "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order would be "
-            "less without it",
-            (at_most("", 3.5, order_of_series(3), why="the third is enough, since Phi is itself a derivative"),),
+            "order of the error of a Taylor series for y' = Phi that uses the derivatives of Phi up to the third; Phi = -y "
+            "(our example), up to t = 1, steps of 0.1 and 0.05",
+            "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order without it "
+            "would be lower",
+            (
+                at_most(
+                    "", 3.5, order_of_series(3), why="the third derivative is enough, since Phi is itself a derivative"
+                ),
+            ),
         ),
     ]
 
@@ -619,18 +628,18 @@ def _hamming_statements() -> list[Statement]:
             "One of their most attractive qualities is that they require only two evaluations of the function "
             "[Phi] per step of integration.",
             text("2.4, L1387-1391"),
-            "evaluations that a further step of (2.28) to (2.31) takes",
-            "none, they are counted",
+            "number of evaluations in one further step of (2.28) to (2.31)",
+            "none, since they are counted",
             (replace(near("", 2.0, evaluations_a_step(), 0.0), stated="two"),),
         ),
         Statement(
             "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
             text("2.4, L1407-1409"),
-            "order at which the error of u at 420 rpm falls by (2.28) to (2.31), second approach, from steps of "
-            f"{1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
-            "at least the order",
+            "order with which the error of u at 420 rpm falls, by (2.28) to (2.31) in the second approach, when the step "
+            f"changes from {1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
+            "at least the stated order",
             (replace(at_least("", 4.0, order), stated="fourth"),),
-            "modifier and final value take the leading error out, and add one",
+            "the modifier and the final value remove the leading error, which adds one order",
         ),
     ]
 

@@ -60,8 +60,8 @@ CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
 TIME = "time [s]"
 #: Our choices in the launches.
 UNSAID = (
-    "The text gives neither the damper of the launches, nor how long they are followed, nor, with three torques, the spring: "
-    "here the damper of Fig 3.4, 1 s, and the middle one of its springs."
+    "The text does not give the damper of the launches, nor how long they are followed, nor the spring of the launches with "
+    "three torques. We take the damper of Fig 3.4, 1 s, and the middle spring of Fig 3.4."
 )
 
 
@@ -275,8 +275,8 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 
 #: How the rise of the crank speed is judged.
 RISE = (
-    "greatest distance of the crank speed, up to its peak while the torque acts, from the line whose greatest distance from "
-    "the curve is least, relative to the peak; crank angle of this peak, before the torque ends at 1 rad"
+    "greatest distance of the crank speed, up to its peak while the torque acts, from the best line (its greatest distance "
+    "from the curve is least), relative to the peak. Then the crank angle of this peak, before the torque ends at 1 rad"
 )
 
 
@@ -312,7 +312,7 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
-    """Judge whether the speed of a free crank swings within each turn and its mean falls from turn to turn."""
+    """Judge whether the speed of a free crank oscillates within each turn and its mean falls from turn to turn."""
     turns = [Turns.from_run(run, start) for run in runs.values()]
     return (
         at_least("range over the mean in a turn, least", ALIKE, min((t.speed_range / t.speed).min() for t in turns)),
@@ -321,7 +321,7 @@ def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ..
 
 
 def _second_halves(runs: Sequence[Trajectory], start: float) -> list[NDArray[np.float64]]:
-    """Return the mean speeds of the turns in the second half of each run, the same turns of all, relative to its first turn."""
+    """Return the mean speeds of the turns in the second half of each run (the same turns), relative to its first turn."""
     speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]
@@ -344,8 +344,8 @@ def _undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: f
     """Return the range of the mean speed of a turn without the damper, in the runs of `_damper_cases`, in words."""
     free = np.concatenate([_second_halves(runs, start)[0] for runs in pairs.values()])
     return (
-        f"without the damper the mean speed of a turn rises and falls between {free.min():.2f} and {free.max():.2f} of "
-        "that of the first"
+        f"without the damper, the mean speed of a turn varies between {free.min():.2f} and {free.max():.2f} of that of the "
+        "first turn"
     )
 
 
@@ -357,12 +357,12 @@ def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
 
 #: What is measured by `_swing_cases` and `_damper_cases`.
 SWINGS = (
-    "range of the crank speed in a turn over its mean; mean relative to that of the turn before, by which we judge the decay; "
-    "free motions"
+    "range of the crank speed in a turn divided by its mean; for the decay, the mean relative to that of the turn before. "
+    "Free motions"
 )
 UNDAMPED = (
-    "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
-    "the damper and with it, over the turns that both have"
+    "greatest mean crank speed of a turn in the second half of the free motion, relative to that of the first turn, without "
+    "the damper and with it, over the turns that both motions have"
 )
 #: The tolerance of `_damper_cases`.
 LOSS = f"{ALIKE_WORDS}; a loss is more than that, and lasts"
@@ -394,7 +394,7 @@ def launch_speeds() -> StudyResult:
     rises = {label: run_acceleration(torque) for label, torque in zip(runs, TORQUES)}
     return _launch_result(
         "3.6",
-        "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
+        "The speed rises linearly until the torque no longer accelerates the crank, then oscillates and decays.",
         runs,
         CRANK_SPEED,
         Statement(
@@ -418,7 +418,7 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED}; runs of 3 s, ours",
+            f"{UNDAMPED}; runs of 3 s (our choice)",
             LOSS,
             _damper_cases(undamped, 1.0),
             _undamped_range(undamped, 1.0),
@@ -441,8 +441,9 @@ def torque_over_time() -> StudyResult:
                 "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
                 "shows a hyperbolic relationship[ ]between T0 and T [the time] asymptotic to [T0 = 0 and T = 0].",
                 text("3.2.2, L2134-2142"),
-                "exponent of the time in T0, mean of the two between the three torques; least T0 that turns the crank by 1 "
-                f"rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm, ours, relative to that at {plain(TORQUES[0])}",
+                "exponent of the time in T0, the mean of the two exponents between the three torques; least T0 that turns "
+                f"the crank by 1 rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm (our choice), relative to the "
+                f"time at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; {SMALL:g}, the rule for *small*, for the asymptotes",
                 (
                     near(
@@ -487,15 +488,15 @@ def launch_positions() -> StudyResult:
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
         "3.8",
-        "The harder the launch, the further the slider moves from its start, and the later it settles to a decay.",
+        "The harder the launch, the further the slider moves from its start, and the later it settles into a decay.",
         runs,
         SLIDER,
         Statement(
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
             "steady state decay.",
             text("3.2.2, L2155-2159"),
-            f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay, as at Fig 3.10, relative to "
-            "the longest of the other torques; mean of u relative to the turn before, from then on",
+            f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay (as at Fig 3.10), relative "
+            "to the longest such time with the other torques; from then on, mean of u relative to the turn before",
             SIGN,
             _settled(),
         ),
@@ -503,8 +504,8 @@ def launch_positions() -> StudyResult:
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
             "would be expected the shift from its initial position is greatest in the highest input torque case.",
             text("3.2.2, L2159-2167"),
-            "greatest u, relative to the greatest size of u in the graph; least u of the three, the shaft being at "
-            f"{shaft:g} cm; for *shift*, size of the mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 "
+            "greatest u, relative to the greatest size of u in the graph; least u of the three responses (the shaft is at "
+            f"{shaft:g} cm). For *shift*: size of the mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 "
             "dyn.cm relative to the greater of the two others",
             f"{ALIKE_WORDS}; {SIGN}",
             (
@@ -513,7 +514,7 @@ def launch_positions() -> StudyResult:
                         f"greatest u; {label}",
                         ALIKE,
                         run["slider.position"].max() / largest,
-                        why="after the weakest launch it swings to both sides of its start",
+                        why="after the weakest launch the slider moves to both sides of its start",
                     )
                     for label, run in runs.items()
                 ),
@@ -552,8 +553,9 @@ def launch_speeds_by_spring() -> StudyResult:
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            "least range of the crank speed in a turn over its mean, up to 1 s; greatest mean speed of a turn in the second "
-            "half of 3 s, ours, relative to that of the first turn, without the damper and with it, as at Fig 3.6",
+            "least range of the crank speed in a turn divided by its mean, up to 1 s; greatest mean speed of a turn in the "
+            "second half of 3 s (our choice), relative to that of the first turn, without the damper and with it, as at Fig "
+            "3.6",
             LOSS,
             (_swing_cases(_spring_runs(), 1.0)[0], *_damper_cases(undamped, 1.0)),
             _undamped_range(undamped, 1.0),
@@ -562,8 +564,8 @@ def launch_speeds_by_spring() -> StudyResult:
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
             "similar loads and movement of slider.",
             text("3.2.2, L2187-2191"),
-            "spread between the springs, at equal shares of the time to 1 rad, of the crank speed and, for the loads, of the "
-            "force at pin C, each relative to its peak; the slider's movement is judged at Fig 3.10",
+            "spread between the springs of the crank speed and, for the loads, of the force at pin C, at equal fractions of "
+            "the time to 1 rad, each relative to its peak. The slider's movement is judged at Fig 3.10",
             f"{ALIKE_WORDS}; {ABOUT:g}, the rule for *similar*",
             (
                 at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
@@ -582,15 +584,15 @@ def launch_positions_by_spring() -> StudyResult:
     times = {name: [x.time for x in settlings] for name, settlings in (("springs", settled), ("torques", by_torque))}
     return _launch_result(
         "3.10",
-        "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
-        "on spring and torque, and then a steady decay.",
+        "The slider moves alike with all springs while the torque acts. A transient follows, whose duration depends on "
+        "spring and torque, and then a steady decay.",
         runs,
         SLIDER,
         Statement(
             "... similar loads and movement of slider. The latter is verified in Fig. (3.10) in which the slider response is "
             "shown.",
             text("3.2.2, L2191-2195"),
-            "spread of u between the springs, at equal shares of the time to 1 rad, relative to its range in that time",
+            "spread of u between the springs, at equal fractions of the time to 1 rad, relative to its range in that time",
             f"{ABOUT:g}, the rule for *similar*",
             (at_most("greatest", ABOUT, apart),),
         ),
@@ -598,10 +600,10 @@ def launch_positions_by_spring() -> StudyResult:
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
-            "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and in "
-            "the last in 1 s: from u of a free crank, at equal crank angle and mean speed, released at "
-            f"{RELEASED[STIFF]:g} rpm, with k = 5e5 dyn/cm at {RELEASED[SOFT]:g}, ours; mean of u relative to the turn before, "
-            f"once within {ALIKE:g} of that decay",
+            "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and "
+            "in the last turn within 1 s. The steady decay is u of a free crank at equal crank angle and mean speed, "
+            f"released at {RELEASED[STIFF]:g} rpm, or with k = 5e5 dyn/cm at {RELEASED[SOFT]:g} (our choice). Then the mean "
+            f"of u relative to the turn before, once u is within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
@@ -620,7 +622,7 @@ def launch_positions_by_spring() -> StudyResult:
             "values.",
             text("3.2.2, L2201-2205"),
             f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before; the "
-            "longest over the shortest",
+            "longest time divided by the shortest",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*",
             tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in times.items()),
         ),
@@ -643,9 +645,9 @@ def _coast_result(
         number=number,
         claim=claim,
         assignment=(
-            "The text does not say at which crank angle the torque is taken away, nor how long the motion is "
-            f"followed: here at 0 from the steady motion, until the mean crank speed falls below {HARMONIC_SPEED:g} "
-            "rad/s, which the text names."
+            "The text does not say at which crank angle the torque is removed, nor how long the motion is followed. We "
+            "remove it at 0 from the steady motion, and follow the motion until the mean crank speed falls below "
+            f"{HARMONIC_SPEED:g} rad/s, which the text names."
         ),
         columns={name: values[: last + 1] for name, values in columns.items()},
         statements=statements,
@@ -657,7 +659,7 @@ def free_speed(number: str, stiffness: float) -> StudyResult:
     run = coast(stiffness)
     return _coast_result(
         number,
-        "The speed of the crank that is left to itself swings; the swing and the mean decrease.",
+        "The speed of the free crank oscillates; the oscillation and the mean decrease.",
         run,
         {
             "turns of the crank [1]": run["crank.angle"] / (2.0 * pi),
@@ -674,8 +676,8 @@ def _free_swings() -> Statement:
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
         text("3.3, L2241-2251"),
-        "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest; all "
-        "turns in 10 s, ours",
+        "least range of the crank speed in a turn, divided by its mean; range and mean relative to the turn before, each at "
+        "its greatest; all turns in 10 s (our choice)",
         f"{ALIKE:g}, the rule for *steady*; {SIGN}",
         tuple(
             case
@@ -700,10 +702,10 @@ def _free_causes() -> Statement:
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
         "speed is due to viscous dissipation of energy in the slider.",
         text("3.3, L2253-2259"),
-        "*the non-linearities* are read as the change of the inertia with the position: relative range of the kinetic energy "
-        f"in a turn over that of the crank speed squared, greatest down to {HARMONIC_SPEED:g} rad/s, which is the part of the "
-        "swing that they leave; greatest mean speed of a turn in the second half of 4 s, ours, relative to that of the first "
-        "turn, without the damper and with it, as at Fig 3.6",
+        "*the non-linearities* are read as the change of the inertia with the position. First the relative range of the "
+        f"kinetic energy in a turn divided by that of the crank speed squared, the greatest down to {HARMONIC_SPEED:g} "
+        "rad/s: this is the part of the oscillation that they do not explain. Then the greatest mean speed of a turn in the "
+        "second half of 4 s (our choice), relative to that of the first turn, without the damper and with it, as at Fig 3.6",
         f"at most half, as *due to* says; {LOSS}",
         (*swings, *_damper_cases(undamped, 0.0)),
         _undamped_range(undamped, 0.0),
@@ -723,7 +725,7 @@ def _phase_plane(number: str, stiffness: float, *statements: Statement) -> Study
     run, label = coast(stiffness), f"k = {plain(stiffness)} dyn/cm"
     return _coast_result(
         number,
-        "The slider tends to u = 0 and u' = 0 with decreasing swings, a drift, and higher harmonics.",
+        "The slider tends to u = 0 and u' = 0 with decreasing oscillations, a drift, and higher harmonics.",
         run,
         {
             f"slider position u; {label} [cm]": CM_PER_METRE * run["slider.position"],
@@ -766,14 +768,14 @@ def soft_phase_plane() -> StudyResult:
             "fact be smooth curves following the line pattern of the curves and appear as straight lines only because no "
             "points were sampled between the end points of each segment.",
             text("3.3, L2266-2276"),
-            "order, in the time between samples, of the greatest distance of the curve from the middle of a straight segment, "
-            "with u and u' as shares of their ranges; samples 2 and 1 ms apart, ours",
-            "2, as of a smooth curve, where it is 1 at a corner; 0.05, as an order is a whole number",
+            "order, in the time between samples, of the greatest distance of the curve from the middle of a straight "
+            "segment, with u and u' relative to their ranges; samples 2 and 1 ms apart (our choice)",
+            "order 2, as for a smooth curve (at a corner it is 1); 0.05, since an order is a whole number",
             (
                 Case(
                     label="straight segments",
                     computed=None,
-                    why="the segments are in the drawing, which we do not have",
+                    why="the segments are in the drawing, which our copy lacks",
                 ),
                 *(near(f"smooth; {label}", 2.0, order_of_chords(coast(k)), 0.05) for label, k in BOTH.items()),
             ),
@@ -783,9 +785,9 @@ def soft_phase_plane() -> StudyResult:
             "amplitude of the oscillation decreases and a superimposed shift on the slider position, in the form of "
             "a drift towards u=[0], is noticeable.",
             text("3.3, L2276-2287"),
-            "range of u and u' and distance of the mean of u from 0, relative to the turn before, greatest from the fourth "
-            "turn on, ours, as the release has a transient; drift of the mean of u over the turns drawn, relative to the "
-            "greatest range of u in a turn",
+            "range of u and u' and distance of the mean of u from 0, relative to the turn before: the greatest values from "
+            "the fourth turn on (our choice), since the release causes a transient. Then the drift of the mean of u over "
+            "the turns drawn, relative to the greatest range of u in a turn",
             f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
             (*tending, *drifts),
         ),
@@ -793,24 +795,24 @@ def soft_phase_plane() -> StudyResult:
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
             "of oscillation further away from u=[0].",
             text("3.3, L2287-2293"),
-            "drift of the mean of u over the turns drawn, and its distance from 0 in the first, relative to those with k = 2e6 "
-            "dyn/cm",
+            "drift of the mean of u over the turns drawn, and distance of this mean from 0 in the first turn, relative to "
+            "those with k = 2e6 dyn/cm",
             SIGN,
             (at_least("drift", 1.0, drift), at_least("distance", 1.0, distance)),
         ),
         Statement(
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
             text("3.3, L2293-2297"),
-            "higher harmonics of u, root of the sum of their squares, over the first, least of the turns drawn; this ratio "
-            "over that by the equation linear in u with the same motion of the crank, greatest: *non-linear* is read as "
-            "non-linear in u, in which chapter IV linearises (L2361)",
+            "higher harmonics of u (root of the sum of their squares) divided by the first harmonic, the least of the turns "
+            "drawn. Then this ratio divided by the ratio that the equation linear in u gives for the same motion of the "
+            "crank, the greatest: *non-linear* is read as non-linear in u, since chapter IV linearises in u (L2361)",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (
                 *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
                 *(at_least(f"non-linear; {label}", 1.0 + ALIKE, harmonics_over_linear(k)) for label, k in BOTH.items()),
             ),
-            "the equation linear in u has these harmonics too: the geometry of the linkage forces them",
+            "the equation linear in u has these harmonics too, because the geometry of the linkage forces them",
         ),
     )
 
@@ -891,9 +893,9 @@ def stiff_phase_plane() -> StudyResult:
             "However, these non-linearities are more manifested in Fig. (3.14) around the crank angular speed of 27 "
             "rad/sec.",
             text("3.3, L2297-2301"),
-            "second harmonic of u over the first, ours, at a mean crank speed of 27 rad/s, relative to that with k = 5e5 "
-            "dyn/cm; speed at which it, and the second harmonic over the speed squared, is greatest, the motion followed "
-            f"beyond the plot, down to {stiff.speed[-1]:.1f} rad/s",
+            "second harmonic of u divided by the first (our measure) at a mean crank speed of 27 rad/s, relative to that "
+            "with k = 5e5 dyn/cm. Then the speeds at which this ratio, and the second harmonic divided by the speed "
+            f"squared, are greatest; the motion is followed beyond the plot, down to {stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
                 at_least("at 27 rad/s", 1.0, seen[0] / seen[1]),
@@ -904,37 +906,42 @@ def stiff_phase_plane() -> StudyResult:
                     most,
                     ABOUT * HARMONIC_SPEED,
                     "rad/s",
-                    why=f"it goes on growing down to {most:.0f} rad/s: the damper lowers and broadens the resonance",
+                    why=(
+                        f"the ratio goes on growing down to {most:.0f} rad/s, because the damper lowers and broadens the "
+                        "resonance"
+                    ),
                 ),
             ),
         ),
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
             text("3.3, L2301-2305"),
-            "half the natural frequency with the mean effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
+            "half the natural frequency, computed with the mean effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
             f"{ABOUT:g}, the rule for *approximately*",
             (near("", "27", half, 27.0 * ABOUT, "rad/s"),),
         ),
         Statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
-            "*subharmonic* is read as a resonance of the second harmonic at half the natural frequency: mean crank speed at "
-            "which this harmonic over the speed squared, with which its force grows, is greatest, relative to that of the row "
-            "before; higher harmonics relative to those by the equation linear in u, as at Fig 3.13",
+            "*subharmonic* is read as a resonance of the second harmonic at half the natural frequency. First the mean "
+            "crank speed at which this harmonic divided by the speed squared is greatest, relative to the frequency of the "
+            "row before; the force of the harmonic grows with the speed squared. Then the higher harmonics relative to "
+            "those by the equation linear in u, as at Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
                 Case(label="resonance", computed=resonance / half, lower=1.0 - lowered, upper=1.0),
                 at_least("non-linearity", 1.0 + ALIKE, harmonics_over_linear(STIFF)),
             ),
-            "the equation linear in u has it too: the second harmonic of the force meets the natural frequency",
+            "the equation linear in u has this resonance too: the second harmonic of the force meets the natural frequency",
         ),
         Statement(
             "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined "
             "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
             "experienced by the slider.",
             text("3.3, L2307-2317"),
-            "natural frequency with the least over that with the greatest effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
+            "natural frequency with the least effective mass of a turn, divided by that with the greatest, at u = 0; k = "
+            "2e6 dyn/cm",
             f"more than {ALIKE:g}, the rule for *the same*",
             (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
         ),

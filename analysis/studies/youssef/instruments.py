@@ -54,16 +54,16 @@ def compute_pulses() -> StudyResult:
     return StudyResult(
         number="8.4",
         claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
-        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque, "
-        f"with spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
+        assignment="No moment of inertia of crank and flywheels is printed. We try two, driven by a constant torque, with "
+        f"spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
         columns=pad_columns(columns),
         statements=(
             Statement(
                 "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
                 "within the crank cycle.",
                 text("8.2.1.2, L6255"),
-                "range of the crank speed over a turn by the times from hole to hole, for which the widths are taken, over the "
-                "range itself",
+                "range of the crank speed over a turn by the times from hole to hole, as which we read the widths, relative "
+                "to the true range",
                 f"{READ:g}, the rule for what is read from a graph",
                 tuple(
                     near(
@@ -146,9 +146,12 @@ def compute_decay() -> StudyResult:
             columns[f"slider position u{name}; rig {number}; spring {spring} [cm]"] = u
     return StudyResult(
         number="8.6",
-        claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping coefficient.",
-        assignment="The text does not say whose response is shown: both rigs', computed, with springs A and C; the blow gives "
-        f"the slider {KICK:g} m/s, and the dry friction is {DRY:g} N, our choices.",
+        claim=(
+            "The disconnected slider is struck, and its oscillation decays; the logarithmic decrement gives the damping "
+            "coefficient."
+        ),
+        assignment="The text does not say which response is shown. We compute those of both rigs, with springs A and C; the "
+        f"blow gives the slider {KICK:g} m/s, and the dry friction is {DRY:g} N, our choices.",
         columns=columns,
         statements=(
             Statement(

@@ -244,10 +244,11 @@ def compute() -> StudyResult:
         columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
     return StudyResult(
         number="4.2",
-        claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
-        assignment="The right linear equation is (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F: the equation of the "
-        "mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta), M, K and F of the period of the crank, "
-        "lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = omega_c/omega and omega_c = mu/(m4 + m5).",
+        claim="Equations (4.1) to (4.35), one by one, each compared with our model or with the equations before it.",
+        assignment="The right linear equation is (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F. It is the "
+        "equation of the mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta). M, K and F "
+        "have the period of the crank; lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = "
+        "omega_c/omega and omega_c = mu/(m4 + m5).",
         columns=columns,
         statements=(*_kinematics(), *_equation(), *_simplification(), *_balance()),
     )
@@ -262,16 +263,17 @@ def _kinematics() -> list[Statement]:
         Statement(
             "The angles [alpha] and [alpha3] are then calculated accordingly.",
             text("4.1, eqs (4.1), (4.6), L2404-2417"),
-            "datum by (4.1) and (4.6), beside ALF, ALF3, ALF4 of appendices 2 to 4 (L8404; 120.99. is read 120.,9.); sigma2 = "
-            "0.05, sigma3 = 1 and sigma = 1, which the thesis does not state but its angles give",
-            "half a degree: the listings have whole ones",
+            "datum by (4.1) and (4.6), compared with ALF, ALF3, ALF4 of appendices 2 to 4 (L8404; 120.99. is read as "
+            "120.,9.), for sigma2 = 0.05, sigma3 = 1 and sigma = 1, which the thesis does not state but which give its "
+            "angles",
+            "half a degree, since the listings have whole degrees",
             tuple(
                 near(
                     name,
                     f"{degrees(x):.0f}",
                     degrees(y),
                     unit="deg",
-                    why=f"with alpha4 rounded to 120 deg before (4.6) is solved, alpha is {rounded:.1f} deg",
+                    why=f"if alpha4 is rounded to 120 deg before (4.6) is solved, alpha is {rounded:.1f} deg",
                 )
                 for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, datum(SIGMA2))
             ),
@@ -300,9 +302,9 @@ def _equation() -> list[Statement]:
             "application of the Lagrangian multiplier method stated in equation (2.5) the following equations are "
             "obtained.",
             text("4.2.1, eqs (4.9) to (4.20), L2495-2613"),
-            "residual of each over its greatest term, with accelerations, pin force at C and crank torque by our equations of "
-            "motion; Table 3.1 without gravity, 25 crank angles, slider positions and velocities of ours; the damper's term "
-            "of (4.18), illegible in the scan, by (4.13)",
+            "residual of each equation divided by its greatest term, with accelerations, pin force at C and crank torque by "
+            "our equations of motion, for Table 3.1 without gravity, at 25 crank angles with slider positions and "
+            "velocities of ours. The damper's term of (4.18), illegible in the scan, is taken from (4.13)",
             f"{ROUNDING:g}, above rounding errors",
             tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
         ),
@@ -311,20 +313,21 @@ def _equation() -> list[Statement]:
             "multiples of [zeta] and its derivatives are ignored the following linearised equation of motion of the slider "
             "may be obtained. [(4.21)]",
             text("4.2.1, eq (4.21), L2620-2794"),
-            "coefficients after division by A1 + B1 cos + C1 sin, the factor of the spring, over those of the right equation, "
-            f"to first order; I4 = 1, sigma2 = {SHORT[1]:g}, datum by (4.1), conditions of 4.5; factor of zeta' without a "
-            "damper over M'",
-            f"{LIMIT:g}, more than the terms of second order, which are a few sigma2",
+            "coefficients after division by A1 + B1 cos + C1 sin, the factor of the spring, relative to those of the right "
+            f"equation, to first order, at I4 = 1, sigma2 = {SHORT[1]:g}, with the datum by (4.1) and the conditions of 4.5. "
+            "Without a damper, the factor of zeta' is divided by M'",
+            f"{LIMIT:g}, which exceeds the terms of second order, a few sigma2",
             (
                 *(
-                    Case(label=name, computed=None, why="its sign cannot be read, its size is right")
+                    Case(label=name, computed=None, why="its sign cannot be read; its size is right")
                     if name.startswith("P1")
                     else near(name, 1.0, x, LIMIT, why="three times too large")
                     for name, x in coefficient_ratios(SHORT[1]).items()
                 ),
                 near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
             ),
-            "R1 and S1 are read from appendix 2 (L8449); not judged: G1, Q1, terms with r4 and the coupler's mass",
+            "R1 and S1 are read from appendix 2 (L8449). Not judged are G1, Q1, and the terms with r4 and with the "
+            "coupler's mass",
         ),
     ]
 
@@ -343,23 +346,25 @@ def _simplification() -> list[Statement]:
         Statement(
             "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
             text("4.3, eq (4.22), L2801-2837"),
-            "means of K and F of the right linear equation, in size, over that of the spring's factor; at that end of each of "
-            "Figs 5.1 to 5.3 where they are greatest, with sigma2 = 0.05 and sigma3 = 1 unless another is named",
+            "size of the means of K and F of the right linear equation, divided by the mean of the spring's factor, at the "
+            "end of each of Figs 5.1 to 5.3 where they are greatest; sigma2 = 0.05 and sigma3 = 1 unless the row names "
+            "another value",
             f"{SMALL:g}, the rule for *small*, as *<<* says",
             tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
-            "that epsilon is small is not judged: it has no value",
+            "the smallness of epsilon is not judged, since epsilon has no value",
         ),
         Statement(
             "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
             "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
             "side may be written : [(4.27)]",
             text("4.3, eqs (4.22) to (4.28), L2853-2916"),
-            "order in sigma2, which we take for epsilon, of what (4.23) to (4.28) leave out of the quotients by D1 + E1 cos + "
-            "F1 sin in (4.21), as printed, P1 with the sign of H1: S, the factor of damper and spring, K and F; from "
-            f"sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 with k3 k6 + k4 k5, as in the listing (L8448)",
-            "3; 0.05, as an order is a whole number",
+            f"order in sigma2 (which we take for epsilon) of the error of (4.23) to (4.28), from sigma2 = {SHORT[0]:g} to "
+            f"{SHORT[1]:g} at I4 = 1. The error is the difference from the exact quotients by D1 + E1 cos + F1 sin in "
+            "(4.21): S, the factor of damper and spring, K and F. (4.21) is taken as printed, with the sign of H1 for P1; "
+            "b4 has k3 k6 + k4 k5, as in the listing (L8448)",
+            "order 3; 0.05, since an order is a whole number",
             tuple(
-                at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
+                at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too, which is left out")
                 for part, orders in left.items()
                 for name, x in zip(("mean", "first harmonic", "second harmonic"), orders)
             ),

@@ -40,7 +40,7 @@ def compute() -> StudyResult:
     return StudyResult(
         number=NUMBER,
         claim="A five-bar linkage whose rocker pin slides on a sprung and damped guide has two degrees of freedom.",
-        assignment="A picture of ours, with a coupler point of ours.",
+        assignment="The picture and its coupler point are ours.",
         columns={
             "time [s]": t.time,
             "crank angle [rad]": t["crank.angle"],

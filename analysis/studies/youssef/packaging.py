@@ -73,8 +73,8 @@ def compute() -> StudyResult:
             "region: nineteen desired points, 72 actual ones."
         ),
         assignment=(
-            "The figure with region and points is missing in our copy; the target drawn is the polygon of the ten points of "
-            "the program (L9021)."
+            "The figure with region and points is missing in our copy. The target in the plot is the polygon of the ten "
+            "points of the program (L9021)."
         ),
         columns=pad_columns(columns),
         statements=(
@@ -88,9 +88,9 @@ def compute() -> StudyResult:
                 "The constraints are (1) the straight line travel AB should be achieved within the first 120° rotation of "
                 "the crank and (2) the crank shaft should be below the line of travel of the package.",
                 text("6.4.3, L5103"),
-                "extent in y over extent in x of the printed linkage's straightest travel that is at least as long as AB, "
-                f"{TRAVEL_CM:g} cm between the program's points, and lies within 120 deg of crank rotation, in steps of 5 deg; "
-                "height of the crank shaft",
+                "extent in y divided by extent in x, for the straightest travel of the printed linkage that is at least as "
+                f"long as AB, {TRAVEL_CM:g} cm between the program's points, and lies within 120 deg of crank rotation, in "
+                "steps of 5 deg. Then the height of the crank shaft",
                 f"{ALIKE:g}, the rule for *straight*; [{line:g}] cm, the height of the program's line (L9022, its last digit "
                 "illegible)",
                 (
@@ -101,7 +101,8 @@ def compute() -> StudyResult:
                     ),
                     at_most("height of the crank shaft", line, above, "cm"),
                 ),
-                "th20 is not printed: any 120 deg count as the first; of the two closures the better, see L4804",
+                "th20 is not printed, so that any 120 deg count as the first. Of the two closures we take the better, see "
+                "L4804",
             ),
             Statement(
                 "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "

@@ -165,8 +165,8 @@ def compute() -> StudyResult:
     ratios = {f"Fig {n}": printed_error(row.problem) / descent_error(row.problem) for n, row in TABLE.items()}
     return StudyResult(
         number=NUMBER,
-        claim="The quality functions of function and path generation may be combined into one; ellipse (a).",
-        assignment="The thesis gives no example: problem, equal weights and the limit of the links are our choice.",
+        claim="The quality functions of function and path generation may be combined into one. The example is ellipse (a).",
+        assignment="The thesis gives no example. Problem, equal weights and the limit of the links are our choice.",
         columns=pad_columns(columns),
         statements=(
             Statement(
@@ -174,12 +174,13 @@ def compute() -> StudyResult:
                 "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
                 "specified times.",
                 text("6.2.2, L4205"),
-                "area between curve and ellipse (a) of the linkage with the least error (6.6) over the least area; both the "
-                f"least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link above "
-                f"{CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
-                f"above {1.0 + ALIKE:g}, the rule for *the same*: a condition that costs nothing would leave the area",
+                "area between curve and ellipse (a) of the linkage with the least error (6.6), relative to the least area. "
+                f"Both are the least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link "
+                f"above {CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
+                f"above {1.0 + ALIKE:g}, the rule for *the same*, since a condition that costs nothing would leave the area "
+                "unchanged",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
-                "that minimisation yields a minimum claims nothing",
+                "that minimisation yields a minimum is not judged, since it claims nothing",
             ),
             Statement(
                 "An approximation to the desired output may, therefore, be obtained by taking both function and path "
@@ -196,11 +197,11 @@ def compute() -> StudyResult:
             Statement(
                 "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
                 text("6.3.2, L4514"),
-                f"number of {SAMPLES} random four-bars, lengths from 0.1 to 1, for which C of (6.12) is less at another of 72 "
-                "crank angles",
-                "none of a count",
+                f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at another "
+                "of 72 crank angles",
+                "none, since counts are exact",
                 (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
-                "it is so for all lengths, since C has -4 l1^2 l2^2 times the square of Coswt",
+                "this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
             ),
             Statement(
                 "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
@@ -221,11 +222,12 @@ def compute() -> StudyResult:
                 "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
                 "planar linkage yielding in all cases a minimum.",
                 text("6.5, L5136"),
-                f"error of the printed linkage, mended, over that at the end of a descent from it: at most {STEPS} steps, no "
-                "longer link, at Fig 6.6 within its bounds",
-                f"{1.0 + ALIKE:g}, the rule for *the same*: at a minimum there is no descent",
+                "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent "
+                f"has at most {STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within "
+                "the printed bounds",
+                f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
                 (
-                    *(at_most(name, 1.0 + ALIKE, ratio, why="it is no minimum") for name, ratio in ratios.items()),
+                    *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
                     Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
                     Case(label="other types of linkage", computed=None, why="none is given"),
                 ),

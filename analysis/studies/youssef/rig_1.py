@@ -74,28 +74,29 @@ def compute_rig_1() -> StudyResult:
     at, most = accommodated["B"]
     return StudyResult(
         number="rig-1-resonance",
-        claim="With spring A there is one motion at each speed; with spring B resonance leans over, and below its peak two "
-        "stable motions exist at a time.",
+        claim="With spring A there is one motion at each speed. With spring B the resonance curve leans over, and below its "
+        "peak two stable motions exist at the same speed.",
         columns=pad_columns(columns),
         statements=(
             Statement(
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
                 "resonance curves could not be obtained using this apparatus.",
                 text("8.4.1.2, L6543"),
-                "amplitude at the natural frequency, 580 and 1160 rpm (L6553), over the greatest at the speeds of the next "
-                "sentence, which the guide did accommodate",
-                "at least 1: *large* is more than the guide did accommodate, as its length is not printed",
+                "amplitude at the natural frequency, 580 and 1160 rpm (L6553), relative to the greatest amplitude at the "
+                "speeds of the next sentence, which the guide did accommodate",
+                "at least 1: we read *large* as more than the guide did accommodate, since its length is not printed",
                 tuple(at_least(f"spring {s}", 1.0, amplitude(turn(s, NATURAL[s])) / accommodated[s][1]) for s in "AB"),
             ),
             Statement(
                 "However when the speed was increased to 500 RPM with spring A and 800 RPM with spring B the amplitude of "
                 "slider oscillations was so large that the slider guide could not accommodate it.",
                 text("8.4.1.2, L6555"),
-                "amplitude at this speed over the greatest at lower speeds, which the guide did accommodate: every 5 rpm from "
-                "240 (spring A) and 500 rpm (spring B) on, the lowest of the figures",
-                "at least 1: what the guide accommodated is no more than it can",
+                "amplitude at this speed, relative to the greatest at lower speeds, which the guide did accommodate: every "
+                "5 rpm from 240 rpm (spring A) and 500 rpm (spring B), the lowest speeds of the figures",
+                "at least 1, since the guide can accommodate at least what it did accommodate",
                 tuple(at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, stopped[s] / accommodated[s][1]) for s in "AB"),
-                f"with spring B it is {stopped['B']:.2f} cm, and {most:.2f} at {at:.0f} rpm, where the rig did run (Fig 8.16)",
+                f"with spring B it is {stopped['B']:.2f} cm, but {most:.2f} cm at {at:.0f} rpm, where the rig did run (Fig "
+                "8.16)",
             ),
         ),
     )
@@ -231,9 +232,10 @@ def compute_friction() -> StudyResult:
         number="rig-1-friction",
         claim="Friction in proportion to the guide's force lowers the amplitude slightly and hardly shifts the motion.",
         assignment=(
-            f"The text gives no coefficient and no measured amplitude. Coefficients of {ends[0]:.3f} to {ends[1]:.3f} take "
-            f"{100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} % off the amplitude with spring A at 390, 420 and 450 rpm, a slight "
-            "variation. Each case has the end of this range and the speed that count against the sentence."
+            "The text gives no coefficient and no measured amplitude. With spring A at 390, 420 and 450 rpm, coefficients "
+            f"of {ends[0]:.3f} to {ends[1]:.3f} reduce the amplitude by {100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} %, a "
+            "slight variation. Each case takes that end of this range and that speed which are least favourable to the "
+            "sentence."
         ),
         columns=pad_columns(columns),
         statements=_friction(ends),
@@ -253,7 +255,8 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
             "[That the phase is almost in total agreement while the amplitude shows slight variations] may be explained by "
             "the fact that the frictional forces opposing the slider motion are considered solely viscous in the theory.",
             text("8.4.1.1, L6486"),
-            "delay, to 0.25 deg, at which the motion with friction in the guide agrees best with that without",
+            "delay in crank angle, to 0.25 deg, at which the motion with friction in the guide agrees best with the motion "
+            "without it",
             f"{ABOUT_DEG:g} deg, the rule for *almost*",
             (at_most("shift", ABOUT_DEG, max(abs(lag("A", w, c)) for w, c in each), "deg"),),
         ),
@@ -261,8 +264,8 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
             "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
             "although in this experiment the viscous forces are dominant.",
             text("8.4.1.1, L6490"),
-            "Coulomb's friction in the guide over the damper's force, by the mean and by the greatest force in a turn",
-            "at most 1: *dominant* is the greater",
+            "Coulomb friction in the guide divided by the damper's force, for the mean and for the greatest force in a turn",
+            "at most 1, since the *dominant* force is the greater",
             (
                 at_most("mean force", 1.0, rubbed[:, 0].max()),
                 Case(
@@ -272,7 +275,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
                     "coefficients",
                 ),
             ),
-            "that there is Coulomb's friction is taken as given",
+            "that Coulomb friction exists is taken as given",
         ),
         Statement(
             "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "
@@ -280,25 +283,26 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
             "crank cycle, this explains the difference in amplitude between the theoretical and experimental motions "
             "with variation of crank speed and also within one crank cycle.",
             text("8.4.1.1, L6496"),
-            "guide's force: the greatest over the mean in a turn, the greatest at 450 over that at 390 rpm, its greatest "
-            "difference from the vertical force in the joint over the greatest; friction: decrease of the amplitude in cm, the "
-            "greatest over the least of the three speeds, over that ratio with one constant friction, the mean of the three, "
-            "and greatest difference of u from u with constant friction of the same mean, over the amplitude",
-            f"more than {1.0 + ALIKE:g} for a ratio and {ALIKE:g} for a difference that is seen; at most {ALIKE:g} for the "
-            "force of the joint: the rule for *the same*",
+            "for the guide's force: the greatest relative to the mean in a turn; the greatest at 450 rpm relative to that "
+            "at 390 rpm; its greatest difference from the vertical force in the joint, relative to the greatest. For "
+            "friction: the decrease of the amplitude in cm, the greatest of the three speeds relative to the least, divided "
+            "by the same ratio with one constant friction (the mean of the three); then the greatest difference of u from u "
+            "with constant friction of the same mean, relative to the amplitude",
+            f"the rule for *the same*: ratios that are seen exceed {1.0 + ALIKE:g}, differences that are seen exceed "
+            f"{ALIKE:g}, and the force differs from the joint's by at most {ALIKE:g}",
             (
                 at_least(
                     "force, within a cycle", 1.0 + ALIKE, min(f / np.abs(force[w]).mean() for w, f in greatest.items())
                 ),
                 at_least("force, with the speed", 1.0 + ALIKE, greatest[450.0] / greatest[390.0]),
                 at_most(
-                    "force, from the joint's", ALIKE, apart, why="the slider's weight comes on top of the joint's force"
+                    "force, from the joint's", ALIKE, apart, why="the slider's weight is added to the joint's force"
                 ),
                 at_least(
                     "decrease, with the speed",
                     1.0 + ALIKE,
                     min(map(spread_beyond_constant, ends)),
-                    why="that by a constant friction varies as much",
+                    why="with a constant friction the decrease varies as much",
                 ),
                 at_least("difference, within a cycle", ALIKE, min(difference_from_constant(w, c) for w, c in each)),
             ),
@@ -313,7 +317,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
         Statement(
             "The differences may be attributed to the same factors as previously described with spring A.",
             text("8.4.1.1, L6528"),
-            why="the measured curves are lost, and of the three factors two have no size",
+            why="the measured curves are lost, and two of the three factors have no size",
         ),
     )
 

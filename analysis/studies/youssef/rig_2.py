@@ -33,7 +33,8 @@ BEYOND, DAMPERS = {"C": (650.0, 700.0, 800.0, 900.0, 1000.0), "D": (890.0, 950.0
 PIN_RADIUS = 3e-4
 #: How the width of a resonance is measured, in words.
 WIDTH = (
-    "width of the range of speeds at which the amplitude over the speed squared is at least 0.71 of its greatest (ours)"
+    "width of the range of speeds at which the amplitude divided by the speed squared is at least 0.71 of its greatest "
+    "value (our choice)"
 )
 
 
@@ -122,11 +123,12 @@ def _resonance() -> tuple[Statement, ...]:
             "These differences may however be attributed to the fact that quantities involving the second and higher orders "
             "of [xi3, xi4] and [sigma2], and their derivatives are ignored in the theory.",
             text(f"{section}, L6847"),
-            f"amplitude beyond resonance, at {beyond} (ours), and {WIDTH}: each by the full equations over that by "
-            "the linear equation, corrected, with sigma2 to first or second order, the greatest ratio",
+            f"amplitude beyond resonance, at {beyond} (our choice), and {WIDTH}. Each is taken by the full equations and "
+            "divided by its value by the linear equation, corrected, with sigma2 to first or second order; the greatest "
+            "ratio is listed",
             larger,
             tuple(at_least(label, 1.0, max(ratios)) for label, ratios in over.items()),
-            "what is ignored lowers the amplitude and narrows the resonance; the orders of xi alone raise the amplitude, by "
+            "what is ignored lowers the amplitude and narrows the resonance. The orders of xi alone raise the amplitude, by "
             f"{100.0 * (min(exact) - 1.0):.2f} to {100.0 * (max(exact) - 1.0):.2f} %",
         ),
         Statement(
@@ -163,9 +165,10 @@ def _resonance() -> tuple[Statement, ...]:
             "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
             "are 582 and 829 for springs C and D respectively.",
             text(f"{section}, L6865"),
-            "natural frequency by the mean effective mass, the nearest to the stated one within the rounding of the printed "
-            "stiffness, of one digit; printed frequency of the sentence before over that with the stiffness as printed",
-            f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, for *good agreement* as for *the same*",
+            "natural frequency by the mean effective mass, the nearest to the stated one that the rounding of the printed "
+            "stiffness (one digit) allows. Then the printed frequency of the sentence before, relative to that with the "
+            "stiffness as printed",
+            f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, the rule for *the same*, which we use for *good agreement*",
             (
                 *(
                     near(
@@ -181,15 +184,15 @@ def _resonance() -> tuple[Statement, ...]:
                     for s in "CD"
                 ),
             ),
-            f"with the stiffness as printed they are {natural['C']:.1f} and {natural['D']:.1f} rpm",
+            f"with the stiffness as printed, they are {natural['C']:.1f} and {natural['D']:.1f} rpm",
         ),
         Statement(
             "[T]he theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
             "the theory that the second and higher orders of [xi3] and [xi4] and their derivatives are negligible is "
             "a reasonable assumption.",
             text(f"{section}, L6974"),
-            "error of the amplitude by the linear equation of chapter IV, corrected, to second order of sigma2, the most from "
-            f"{RANGE[0]:g} to {RANGE[-1]:g} rpm in tens, relative",
+            "greatest relative error of the amplitude by the linear equation of chapter IV, corrected, to second order of "
+            f"sigma2, from {RANGE[0]:g} to {RANGE[-1]:g} rpm in steps of 10",
             f"{SMALL:g}, the rule for *negligible*",
             (
                 *(at_most(f"spring {s}", SMALL, error[s]) for s in "CD"),
@@ -283,27 +286,27 @@ def compute_harmonics() -> StudyResult:
                 "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
                 "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
                 text("8.4.2.2, L6871"),
-                "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no "
-                "maximum is found in the steps of the curve, at most 6 rpm",
+                "rise of the amplitude to the maximum there from the next minimum, relative to this minimum; 0 if the "
+                "curve, in steps of at most 6 rpm, has no maximum",
                 rigs.SEEN_IN_RECORDS,
                 tuple(
                     at_most(f"spring {spring}, {part}", rigs.NOTICED, rigs.peak_rise(spring, n))
                     for spring in "CD"
                     for n, part in ((4, "quarter"), (3, "third"), (2, "half"))
                 ),
-                f"of these places only half with D, {rigs.natural_speed('D') / 2.0:.0f} rpm, lies within the range that was "
-                "run (L6808); how far the first harmonic is the motion is judged at L6814",
+                f"of these places only half the natural frequency with D, {rigs.natural_speed('D') / 2.0:.0f} rpm, lies "
+                "within the range that was run (L6808). How far the motion is the first harmonic is judged at L6814",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "
                 "Fig. (8.21). These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 "
                 "and hence are in agreement with the experiment.",
                 text("8.4.2.2, L6877-6885"),
-                "greatest first harmonic over greatest second one, each at its own speed, by the linear equation, corrected; "
-                "what the experiment showed is judged at L6871",
-                f"{100 * ABOUT:g} %, the rule for *about*, as no digit after 50 is given",
+                "greatest first harmonic divided by the greatest second harmonic, each at its own speed, by the linear "
+                "equation, corrected. What the experiment showed is judged at L6871",
+                f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", _greatest(s, 1) / _greatest(s, 2), ABOUT * 50.0) for s in "CD"),
-                "the equation as printed cannot be solved: the scan garbles terms of (4.21)",
+                "the equation as printed cannot be solved, because the scan garbles terms of (4.21)",
             ),
         ),
     )
@@ -369,8 +372,8 @@ def compute_forces() -> StudyResult:
             columns[f"greatest force in pin {pin}; {name} [N]"] = table[f"greatest force in pin {pin} [N]"]
     return StudyResult(
         number="rig-2-forces",
-        claim="At low speed every force of this horizontal machine grows with the square of the speed; resonance adds most to "
-        "pin D.",
+        claim="At low speed every force of this horizontal machine grows with the square of the speed. Resonance increases "
+        "the force in pin D most.",
         columns=pad_columns(columns),
     )
 

@@ -37,7 +37,7 @@ LOST = "the measured curve is lost with the figure"
 #: Relative rise of the amplitude up to which no one notices it on a graph.
 NOTICED = ALIKE
 SEEN_IN_RECORDS = (
-    f"{NOTICED:g} of the amplitude there, the rule for *the same*, as the records of neighbouring speeds are compared"
+    f"{NOTICED:g} of the amplitude there, the rule for *the same*, since neighbouring records are compared"
 )
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05

@@ -55,7 +55,10 @@ SETS, CHANCE = 2000, 0.05
 #: Kinds of searches: from random sets, and with minima already located among the sets.
 PLAIN, KNOWN = "random sets", "with known minima"
 #: Tolerances in words.
-ALL, LEVEL = f"all, within {SMALL:g} of its error, the rule for *small*", f"{CHANCE:g}, the usual level of significance"
+ALL, LEVEL = (
+    f"all, to within {SMALL:g} of the minimum's error, the rule for *small*",
+    f"{CHANCE:g}, the usual level of significance",
+)
 
 Error = Callable[[FloatArray], float]
 
@@ -265,11 +268,14 @@ def compute() -> StudyResult:
     columns["least error [cm2]"] = np.full(SEARCHES, our_error(PROBLEM))
     return StudyResult(
         number="6.2",
-        claim="The simplex begins at sets of random parameters within their bounds, and is repeated with what it found.",
+        claim=(
+            "The simplex starts from sets of random parameters within their bounds, and is repeated with the results among "
+            "its sets."
+        ),
         assignment=(
-            f"The program of appendix 5, repeated, for ellipse (a) with bounds on the lengths: {SEARCHES} searches of each "
-            "kind. The bounds of place, r and angles are ours. (6.15) tests the errors too, which in the program is a comment "
-            "(L9663), but each parameter by itself, as in the program."
+            f"We repeat the program of appendix 5 for ellipse (a) with bounds on the lengths, {SEARCHES} searches of each "
+            "kind. The bounds of place, r and angles are ours. Criterion (6.15) tests the errors too, which in the program "
+            "is a comment (L9663), but it tests each parameter by itself, as in the program."
         ),
         columns=columns,
         statements=(
@@ -302,38 +308,38 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
         Statement(
             "The method stops when a convergence criterion is satisfied and is [said then] to have located a minimum[.]",
             text("6.3.1, L4324"),
-            f"share of {SEARCHES} searches from random sets, stopped by (6.15) with the program's small number {EPS:g}, whose "
-            "error is that of the minimum to which a descent with derivatives then leads",
+            f"share of {SEARCHES} searches from random sets, stopped by (6.15) with the program's small number {EPS:g}, that "
+            "end with the error of the minimum to which a descent with derivatives then leads",
             ALL,
             (near("at a minimum", 1.0, np.mean(ends <= (1.0 + SMALL) * bottoms), 0.0),),
-            "they stop before they are there",
+            "the searches stop before they reach the minimum",
         ),
         Statement(
             "It must be recognised, as in all optimisation methods, that this located minimum may not be a global minimum. It "
             "is therefore necessary to begin the optimisation from as many initial points as possible.",
             text("6.3.1, L4328-4334"),
-            "greatest over least error of the ends of these searches, which the thesis calls located minima, and of the minima "
-            "to which descents from them lead, the angles free",
+            "greatest error divided by least error, first of the ends of these searches, which the thesis calls located "
+            "minima, then of the minima to which descents from these ends lead with the angles free",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
             (
                 at_least("ends of the searches", 1.0 + ALIKE, ends.max() / ends.min()),
                 at_least("minima next to them", 1.0 + ALIKE, np.nanmax(bottoms) / np.nanmin(bottoms)),
             ),
-            "all end beside one minimum or its mirror images, and differ by how far from it they stop",
+            "all searches end beside one minimum or its mirror images, and differ in how far from it they stop",
         ),
         Statement(
             "It is found that the global optimum is always reached quickly if some of the minima already located are "
             "included as initial values in a fresh optimisation cycle.",
             text("6.3.1, L4341-4345"),
-            f"share of {SEARCHES} fresh searches that reach the best of these ends, the thesis's global optimum (L4338); share "
-            f"with no more evaluations than the median from random sets; {INCLUDED} of the ends (ours), drawn at random, are "
-            "among the sets of each",
+            f"share of {SEARCHES} fresh searches that reach the best of these ends, the thesis's global optimum (L4338); "
+            f"share that need no more evaluations than the median from random sets. Each search has {INCLUDED} of the ends "
+            "(our number), drawn at random, among its sets",
             ALL,
             (
                 near("reached", 1.0, reaches_best(found[KNOWN], plain, quickly=False).mean(), 0.0),
                 near("quickly", 1.0, np.mean([end.evaluations <= usual for end in found[KNOWN]]), 0.0),
             ),
-            "the ends included need not be near the best",
+            "the included ends need not be near the best one",
         ),
     )
 
@@ -345,15 +351,15 @@ def judge_minima() -> Statement:
         "It is also found that the number of minima of the quality function increases with the number of specified "
         "output points.",
         text("6.3.1, L4345"),
-        f"minima for ellipse (a), of errors per {N} points more than {APART:g} cm2 apart, to which descents lead from "
-        f"{DESCENTS} random sets by (6.11), by either closure, the angles free: how many more at the greater number of points "
-        "(ours)",
+        "increase of the number of minima for ellipse (a) with the number of points (our numbers). The minima are those to "
+        f"which descents lead from {DESCENTS} random sets by (6.11), by either closure, with the angles free; they are "
+        f"different if their errors per {N} points are more than {APART:g} cm2 apart",
         "at least one more, the rule for *increases*",
         tuple(
             at_least(f"from {few} to {many} points", 1.0, more - fewer)
             for (few, many), (fewer, more) in zip(pairwise(COUNTED), pairwise(numbers))
         ),
-        f"{', '.join(map(str, numbers))} minima at {', '.join(map(str, COUNTED))} points",
+        f"there are {', '.join(map(str, numbers))} minima at {', '.join(map(str, COUNTED))} points",
     )
 
 
@@ -364,7 +370,7 @@ def judge_techniques() -> tuple[Statement, ...]:
     )
 
     def by_chance(technique: FloatArray, name: str) -> tuple[Case, ...]:
-        """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
+        """Judge whether a technique lowers the errors and the evaluations, compared with searches from random sets."""
         chances = (
             float(mannwhitneyu(improved, reference, alternative="less").pvalue)
             for improved, reference in zip(technique, plain)
@@ -380,9 +386,9 @@ def judge_techniques() -> tuple[Statement, ...]:
             "decreased number of specified output points. These values are then used again in the optimisation but this "
             "time taking all the specified output points into consideration.",
             text("6.3.1, L4349-4359"),
-            f"probability that the errors of {RANKED} searches which begin with {FEWER_POINTS} or {HALF} points (ours) are so "
-            "much lower, and their evaluations so much fewer, than those of as many from random sets by chance (rank test); "
-            f"an evaluation at fewer points counts by their share of {N}",
+            f"rank test of {RANKED} searches that begin with {FEWER_POINTS} or {HALF} points (our numbers) against as many "
+            "from random sets: probability that their errors are so much lower, and their evaluations so much fewer, by "
+            f"chance. An evaluation at fewer points counts by their share of {N}",
             LEVEL,
             (*by_chance(points, f"{FEWER_POINTS} points"), *by_chance(half, f"{HALF} points")),
             f"with {HALF} points the evaluations are not fewer",
@@ -444,14 +450,14 @@ def judge_time(found: Mapping[str, tuple[Found, ...]]) -> Statement:
         "The compilation time of the program is about 17 seconds and the running time depends on the form of the "
         "desired output and the quality of the initial guess of linkage parameters.",
         text("6.5, L5158-5164"),
-        f"for the running time: probability that the evaluations of {SEARCHES} searches differ so much by chance (rank test, "
-        "two-sided) from those above from random sets: of searches for the unweighted rocker function by its five parameters, "
-        "and of those with located minima among their sets",
+        f"for the running time: probability that the numbers of evaluations of {SEARCHES} searches differ so much by chance "
+        "from those of the searches from random sets above (rank test, two-sided). The searches are for the unweighted "
+        "rocker function by its five parameters, and then those with located minima among their sets",
         LEVEL,
         (
             at_most("form of the output", CHANCE, mannwhitneyu(count_evaluations(rocker_error, ROCKER), plain).pvalue),
             at_most("quality of the guess", CHANCE, mannwhitneyu(known, plain).pvalue),
-            Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not at hand"),
+            Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not available"),
         ),
     )
 
@@ -495,8 +501,10 @@ def compute_closures() -> StudyResult:
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * np.append(xy[:, k], xy[0, k]) for k, axis in enumerate("xy")}
     return StudyResult(
         number="6.3",
-        claim="The area between curves is that of triangles between their points; of two closures the better is taken.",
-        assignment="The plot has path (a), the printed linkage.",
+        claim=(
+            "The area between curves is that of the triangles between their points. Of the two closures the better is taken."
+        ),
+        assignment="The plot shows path (a) with the printed linkage.",
         columns=pad_columns(columns),
         statements=(*judge_area(), judge_closures()),
     )
@@ -529,23 +537,24 @@ def judge_area() -> tuple[Statement, ...]:
             "A finite approximation of this relation is obtained by taking a large and equal number of points on the "
             "desired and actual curves.",
             text("6.2.2, L4230"),
-            "area of the triangles over the area between the curves, 360 points on each, printed linkages, mended; the actual "
-            "points are chosen from 720 (L8973) or paired in order (L9894-9898); the farthest from 1 of "
-            f"{FIRST} first points, {360 // FIRST} deg apart",
+            "area of the triangles divided by the area between the curves, with 360 points on each, for the printed "
+            f"linkages, mended. The actual points are chosen from 720 (L8973) or paired in order (L9894-9898). Of {FIRST} "
+            f"first points, {360 // FIRST} deg apart, the ratio farthest from 1 is listed",
             same,
             tuple(triangles),
-            "in order, partners lie far apart with some of the first points",
+            "paired in order, partners lie far apart with some of the first points",
         ),
         Statement(
             "The linkage parameters sufficient for the optimisation in coupler path generation are the same as "
             "mentioned earlier for coupler function generation although the parameter [theta20] is redundant; in this "
             "case, it will be retained to maintain a consistency in presentation of results.",
             text("6.4.1, L4696"),
-            f"area with theta20 greater by {PHASE:g} rad over that as printed, printed linkages, mended; how many of the three "
-            "linkages printed for paths retain theta20. That the parameters suffice follows from (6.17)",
-            f"{same}; none of a count",
+            f"area with theta20 greater by {PHASE:g} rad, divided by the area as printed, for the printed linkages, mended; "
+            "number of the three linkages printed for paths that retain theta20. That the parameters suffice follows from "
+            "(6.17)",
+            f"{same}; none for the number",
             (*phases, near("linkages with theta20", 3.0, 2.0, 0.0)),
-            "that of the packaging machine has none (L5127)",
+            "the linkage of the packaging machine has no theta20 (L5127)",
         ),
     )
 
@@ -559,10 +568,10 @@ def judge_closures() -> Statement:
         "Therefore in evaluating the quality function we must explore both closures and note the closure "
         "corresponding to the minimum error in output generation.",
         text("6.4.1, L4804"),
-        "error by the other closure over that by the better one, the least of the printed linkages with a coupler point, "
-        "mended, the packaging machine by the ten points of the program (L9021); number of these linkages by the better "
-        "closure",
-        f"at least {1.0 + ALIKE:g}, more than *the same*; one of each is enough for *must explore both*",
+        "error by the other closure divided by that by the better one, the least ratio of the printed linkages with a "
+        "coupler point, mended; for the packaging machine by the ten points of the program (L9021). Then the number of "
+        "these linkages with each closure as the better one",
+        f"at least {1.0 + ALIKE:g}, more than *the same*; one linkage of each closure is enough for *must explore both*",
         (
             at_least("other closure over the better", 1.0 + ALIKE, min(ratios)),
             at_least("linkages with C to the left of BD", 1.0, branches.count(1)),

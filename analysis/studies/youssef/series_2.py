@@ -192,7 +192,7 @@ def moved_rocker() -> StudyResult:
         columns[f"angle; {n} [deg]"] = wanted_angle() + columns[f"error; {n} [deg]"]
     return StudyResult(
         number="7.11",
-        claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 deg2.",
+        claim="The slider, moved by two harmonics, reduces the weighted error of the rocker function from 35.0 to 4.8 deg2.",
         assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
         "are taken.",
         columns=columns,
@@ -214,7 +214,7 @@ def _rocker() -> tuple[Statement, ...]:
     raised = linkage_error(ROCKER, best_reading) / kept
     lowered = linkage_error(PATH, mended_path_linkage()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
     two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
-    fewer = f"{SEEN_FALL}: a freedom more cannot raise the least error"
+    fewer = f"{SEEN_FALL}; an additional freedom cannot raise the least error"
     # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
     unknowns = 6
     return (
@@ -230,9 +230,9 @@ def _rocker() -> tuple[Statement, ...]:
         Statement(
             "All the examples discussed in the previous chapter have been tried and in all cases the errors were reduced.",
             text("7.3.2, L5935; also 6.4.2, L4874, L4969"),
-            "error over that with the pivot fixed, the printed links kept, mended: with the printed series where there is one "
-            "(in its best reading, L5965; l4 and A0 of path (b) mended), else with our best of two harmonics, the stroke at "
-            "most a fifth of the longest link (ours)",
+            "error relative to that with the pivot fixed, with the printed links (mended). The slider moves by the printed "
+            "series where there is one (in its best reading, L5965; with l4 and A0 of path (b) mended), and otherwise by "
+            "our best motion of two harmonics, with a stroke of at most a fifth of the longest link (our choice)",
             fewer,
             (
                 at_most(
@@ -252,7 +252,7 @@ def _rocker() -> tuple[Statement, ...]:
         Statement(
             "The figure shows that the weighted portion is generated very closely.",
             text("7.3.2, L5963"),
-            "error of the rocker angle within the weighted portion, rms, with the printed series in its best reading, see "
+            "rms error of the rocker angle within the weighted portion, with the printed series in its best reading, see "
             "L5965",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
             (at_most("printed series", VERY_CLOSE_DEG, window_error(best_reading), "deg"),),
@@ -261,26 +261,26 @@ def _rocker() -> tuple[Statement, ...]:
         Statement(
             "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
             text("7.3.2, L5965"),
-            f"error with the printed series at {angles} crank angles, the least of its readings: its sign, that of its sines "
-            "and of v; A0 whole, a tenth or none; argument omega t or theta2; the nearest to the stated one that rounding each "
-            "number of links and series up or down gives",
+            f"least error at {angles} crank angles over the readings of the printed series. The readings differ in its sign, "
+            "that of its sines and of v; in A0, which is whole, a tenth or none; and in the argument, omega t or theta2. "
+            "Each number of links and series is rounded up or down so that the error comes nearest to the stated one",
             "0.05 deg2, half a unit of the last digit",
             (near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),),
-            f"by the other readings of Fig 6.7, where the 35.0 is judged, it is {least_read:.2f} or more, with the pivot fixed "
-            f"{fixed[reading]:.2f}",
+            f"by the other readings of Fig 6.7, where the 35.0 is judged, the error is {least_read:.2f} or more; with the "
+            f"pivot fixed it is then {fixed[reading]:.2f}",
         ),
         Statement(
             "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
             "equation (7.19) were considered.",
             text("7.3.2, L5969"),
-            "error with the printed series, as above, over that with the pivot fixed; least error with three harmonics over "
-            "that with two, the stroke not bounded",
-            f"0.15 for *enormous*, our choice: 4.8 over 35.0 is 0.14; {fewer}",
+            "error with the printed series, as above, relative to that with the pivot fixed. Then the least error with "
+            "three harmonics relative to that with two, with an unlimited stroke",
+            f"0.15 for *enormous*, our choice, since 4.8 over 35.0 is 0.14; {fewer}",
             (
                 at_most("printed series", 0.15, raised, why="the printed series does not give the stated 4.8"),
                 at_most("three harmonics", 1.0 - ALIKE, three / two),
             ),
-            "there is no equation (7.19): more terms of (7.18) are meant",
+            "there is no equation (7.19); more terms of (7.18) are meant",
         ),
     )
 
@@ -387,7 +387,7 @@ def moved_path() -> StudyResult:
             columns[f"{name} slider [cm]"] = CM_PER_METRE * slider(linkage).series(TURN)
     return StudyResult(
         number="7.12",
-        claim="The slider moved by two harmonics brings the area between path (b) and the curve from 12.6 to 4.3 cm2.",
+        claim="The slider, moved by two harmonics, reduces the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=pad_columns(columns),
         statements=_path(),
     )
@@ -401,8 +401,8 @@ def _path() -> tuple[Statement, ...]:
         Statement(
             "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
             text("7.3.2, L5994"),
-            f"area with the printed series: as printed, and with l4 = 184.443 cm, as in Fig 6.10, and A0 = 0.31 cm, {ROUNDED}, "
-            "series and guide",
+            "area with the printed series: as printed; then with l4 = 184.443 cm, as in Fig 6.10, and A0 = 0.31 cm, "
+            f"{ROUNDED}, also those of series and guide",
             "0.05 cm2, half a unit of the last digit",
             (
                 near(
@@ -426,9 +426,9 @@ def _path() -> tuple[Statement, ...]:
             "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
             "suitable control of U than could otherwise be obtained.",
             text("7.0, L5248"),
-            "area that P reaches over that within the envelope, for the three limits of U of L5242, Fig 7.2 (ours); area "
-            "between path and curve with our best of two harmonics over that with the pivot fixed, as at L5935: *otherwise* "
-            "is read, by us, as with the same links",
+            "area that P reaches relative to that within the envelope, for the three limits of U of L5242, Fig 7.2 (our "
+            "choice). Then the area between path and curve with our best motion of two harmonics, relative to that with the "
+            "pivot fixed, as at L5935: we read *otherwise* as with the same links",
             f"1 %, as at Fig 7.2; {SEEN_FALL}",
             (
                 *(
