@@ -444,7 +444,7 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
 def sample_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
-    """Return the modes, and the values of the channels at s given times and states, shape (s, channels), under given inputs.
+    """Return the values of the modes, and those of the channels at s times and states, shape (s, channels), for given inputs.
 
     Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
     differs from the rate in a state.

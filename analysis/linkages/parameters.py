@@ -351,7 +351,7 @@ def _loads(
     for load in description.loads:
         own = load.point
         if own not in moving:
-            raise unknown_name(own, sorted(moving), f"point {own}, of linkage.loads")
+            raise unknown_name(own, sorted(moving), f"point {own}, named in linkage.loads")
         turns = load.frame == BODY
         of = f" of the {next(body for body in description.bodies if own in points[body])}" if turns else ""
         fixed = turns or own in description.ground
@@ -359,12 +359,12 @@ def _loads(
             yield Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}{of}", "" if fixed else f"{own}.{c}")
     for body in description.torques:
         if body not in description.bodies:
-            raise unknown_name(body, description.bodies, f"body {body}, of linkage.torques")
+            raise unknown_name(body, description.bodies, f"body {body}, named in linkage.torques")
         yield Load(f"{body}.torque", "N.m", f"Torque on the {body}", "")
     for name, spring in description.springs.items():
         for own in spring.between:
             if own not in moving | set(description.ground):
-                raise unknown_name(own, sorted(moving), f"point {own}, of linkage.springs.{name}.between")
+                raise unknown_name(own, sorted(moving), f"point {own}, named in linkage.springs.{name}.between")
         if spring.driven and spring.between:
             yield Load(f"{name}.force", "N", f"Force that lengthens {name}", f"{name}.length")
         elif spring.driven:

@@ -191,7 +191,7 @@ def joints(description: Description) -> dict[str, Joint]:
         _check_line(f"linkage.slots.{name}", (slot.on,), slot.through, owners, known)
     for name, slot in description.slots.items():
         if slot.pin not in owners:
-            raise unknown_name(slot.pin, owners, f"point {slot.pin}, of linkage.slots.{name}")
+            raise unknown_name(slot.pin, owners, f"point {slot.pin}, named in linkage.slots.{name}")
         owners[slot.pin].append(name)
     found: dict[str, Joint] = {name: Pin(name, tuple(of)) for name, of in owners.items() if len(of) > 1}
     lines = {name: Slider(name, (s.on, s.body), s.through, s.direction != 0) for name, s in description.slides.items()}
@@ -206,11 +206,11 @@ def joints(description: Description) -> dict[str, Joint]:
     for name, gear in description.gears.items():
         for part in gear.bodies:
             if part not in known:
-                raise unknown_name(part, known, f"body {part}, of linkage.gears.{name}")
+                raise unknown_name(part, known, f"body {part}, named in linkage.gears.{name}")
     for name, rack in description.racks.items():
         for part in (rack.gear, rack.rack):
             if part not in known:
-                raise unknown_name(part, known, f"body {part}, of linkage.racks.{name}")
+                raise unknown_name(part, known, f"body {part}, named in linkage.racks.{name}")
         carrier_joints(name, rack, found)
     for own in description.bodies:
         if not any(own in joint.bodies for joint in found.values()):
@@ -246,7 +246,7 @@ def _check_line(
     """Raise an error if the body of a line does not exist, or does not have the point of the line."""
     for body in bodies:
         if body not in known:
-            raise unknown_name(body, known, f"body {body}, of {where}")
+            raise unknown_name(body, known, f"body {body}, named in {where}")
     if bodies[0] not in owners.get(through, ()):
         raise LinkageError(f"{where}.through is {through!r}: it must be a point of {bodies[0]}")
 
@@ -338,7 +338,7 @@ def analyse(description: Description) -> Structure:
         )
         of = freedom.joint if freedom.joint in found else next(shared, "")
         if not of:
-            raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
+            raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, named in linkage.freedoms.{name}")
         if len(found[of].bodies) != 2:
             raise LinkageError(
                 f"the freedom {name} is at the pin {of} of {', '.join(found[of].bodies)}: it must be at a joint of two bodies; "

@@ -237,7 +237,7 @@ def catalogue(walk: Walk) -> list[Fault]:
 
 @dataclass(frozen=True, slots=True)
 class BadStart:
-    """A forbidden or unusual instantiation: with another argument, or by another function."""
+    """A forbidden or unusual instantiation: with a changed argument, or by another function."""
 
     what: str  # what is wrong or unusual
     accepted: str | None  # severity of the finding if the FMU makes an instance, or `ACCEPT`

@@ -226,4 +226,4 @@ def _check_samples(times: NDArray[np.float64]) -> NDArray[np.float64]:
 def _check_hold(hold: float, times: NDArray[np.float64]) -> None:
     grid = times[0] + hold * np.arange(len(times))
     if not hold > 0.0 or np.any(np.abs(grid[:-1] - times[:-1]) > 1e-9 * max(hold, 1e-3 * abs(times[-1]))):
-        raise InputError(f"inputs held over {hold} s: the recorded times must be this step apart")
+        raise InputError(f"inputs are held over {hold} s: the recorded times must be {hold} s apart")

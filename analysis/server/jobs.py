@@ -141,7 +141,7 @@ def _exported(case: Case, wanted: _Export) -> Answer:
     motor = motor_parameters(mechanism)
     if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):
         raise InputError(
-            "an FMU has no motor: take it out here, and connect one to the FMU's torque in the system that contains it"
+            "an FMU has no motor: remove the motor, and connect one to the FMU's torque in the system that contains the FMU"
         )
     values = {name: value for name, value in values.items() if name not in motor}
     platforms = tuple(PLATFORMS) if wanted.everywhere else None

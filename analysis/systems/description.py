@@ -266,7 +266,7 @@ def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str
         values |= zip(names, values.pop(key), strict=True)
     for key in values:
         if key not in units:
-            raise unknown_name(key, units, f"variable {key}, of {where}")
+            raise unknown_name(key, units, f"variable {key}, named in {where}")
     return {key: _convert_to_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
 
 

@@ -47,7 +47,7 @@ class LowerBound(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Rules for the values of a mechanism's parameters, besides being finite: the attribute ``RULES`` of their dataclass.
+    """Rules for the values of a mechanism's parameters, which must also be finite: the attribute ``RULES`` of their dataclass.
 
     Attributes
     ----------

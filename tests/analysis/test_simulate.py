@@ -798,7 +798,7 @@ def test_progress_is_the_time_since_the_start(monkeypatch: pytest.MonkeyPatch) -
         ({"hold": 3e-3}, InputError, "held over 0.003 s"),
         ({"hold": -2e-3}, InputError, "held over -0.002 s"),
         ({"hold": nan}, InputError, "held over nan s"),
-        ({"samples": [0.0, 0.1, 0.15], "hold": 0.05}, InputError, "must be this step apart"),
+        ({"samples": [0.0, 0.1, 0.15], "hold": 0.05}, InputError, "must be 0.05 s apart"),
         ({"max_steps": 0}, InputError, "max_steps is 0"),
         ({"max_step": 0.1}, InputError, "takes no options, but was given max_step"),
         ({"start": 0.1}, InputError, "no argument 'start' of simulate; did you mean start_time"),

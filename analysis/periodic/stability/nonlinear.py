@@ -345,7 +345,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     old = newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
     if old.largest <= 1.0:
         raise LinkworkError(
-            f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow"
+            f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow for a run"
         )
     scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))

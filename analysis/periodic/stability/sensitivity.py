@@ -375,7 +375,7 @@ def extremum_gradient(
     names : sequence of str, optional
         FMI names of the other parameters; by default all, see `gradient_names`.
     coordinate : int
-        Index of the free coordinate whose amplitude it is.
+        Index of the free coordinate whose amplitude has the extremum.
 
     Raises
     ------

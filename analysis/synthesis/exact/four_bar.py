@@ -275,7 +275,7 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """Return the cognates of a solution as solutions of its task: the same coupler curve with other pivots.
 
-    If the task gives crank rotations, only the cognate whose crank turns as that of the original is returned. For a closed path
+    If the task gives crank rotations, only the cognate with the same crank rotations is returned. For a closed path
     only cognates whose cranks can turn fully are returned.
 
     Returns

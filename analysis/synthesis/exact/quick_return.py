@@ -182,7 +182,7 @@ class _SwingShapes:
         self.bounds: dict[str, tuple[float, float]] = {}
         for name, (low, high) in dict(bounds or {}).items():
             if name not in LINKS:
-                raise ParameterError(name, (low, high), f"be one of {', '.join(LINKS)}: the others follow")
+                raise ParameterError(name, (low, high), f"bound one of {', '.join(LINKS)}: the other dimensions follow")
             self.bounds[name] = low or 0.0, inf if high is None else high
         self.cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
         chord = 2.0 * sin(0.5 * abs(float(task.swing)))

@@ -563,7 +563,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the value g of the constraint g <= 0, as for a four-bar; mu is the angle between coupler and guide normal."""
+        """Return the constraint g <= 0 as for a four-bar, with mu as the angle between coupler and guide normal."""
         return (farthest - (l3 * cosine) ** 2,)
 
     @staticmethod

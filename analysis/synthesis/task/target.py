@@ -38,7 +38,7 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} is not an array of numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 2:
-        raise InputError(f"{what} has shape {array.shape}: it must be (n, 2), a point a row")
+        raise InputError(f"{what} has shape {array.shape}: it must be (n, 2), one point per row")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise InputError(

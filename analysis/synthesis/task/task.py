@@ -509,7 +509,9 @@ def normal_form(task: Task) -> Normal:
         If the argument is not a task.
     """
     if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
-        raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")
+        raise InputError(
+            f"{task!r} is not a task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints"
+        )
     quality: Quality = "worst" if task.objective == "worst" else "squares"
     if isinstance(task, RockerFunction):
         return Normal(

@@ -21,8 +21,8 @@ from .vectors import Vector, cross, dot, scale
 class Position(NamedTuple):
     """A configuration: cosine and sine of the crank angle, positions of the pins relative to the guide (m).
 
-    ``f, g`` are the coordinates of the crank pin from the guide along i and j of frame 4; ``h`` is the distance of the slider
-    pin from the crank pin's foot on the guide, ``s4`` the slider position.
+    ``f, g`` are the coordinates of the crank pin from the guide along i and j of frame 4; ``h`` is the distance along
+    the guide between the slider pin and the point nearest to the crank pin, ``s4`` the slider position.
     """
 
     c: float
