@@ -293,7 +293,7 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
             "margin of the rod's reach, the least over a turn. First with S1 larger than its greatest value by 1 in, our "
             "choice: the margin is negative where the loop cannot close. Then at the greatest S1, the greatest margin of "
             "the four offsets: it is zero where the two assemblies meet, so that the slider can go to the opposite side",
-            f"none, the sign decides; {ROUNDING}, for zero",
+            f"none, the sign decides; for zero {ROUNDING}",
             (
                 *(
                     at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
