@@ -561,7 +561,7 @@ def _ends() -> tuple[Statement, ...]:
             "to the desired accuracy limits. At this point the displacements are determined only for the first "
             "position of the input link. ... This process is continued for a complete rotation of the input link, the crank.",
             text("section 2.6.1, L465"),
-            "where the printed iteration ends: rotation by which the loop is open, and error of S4, each the greatest of "
+            "rotation by which the loop is open where the printed iteration ends, and error of S4 there, each the greatest of "
             "the turn",
             ROUNDING,
             tuple(determined),
