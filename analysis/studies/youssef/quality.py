@@ -197,8 +197,8 @@ def compute() -> StudyResult:
             Statement(
                 "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
                 text("6.3.2, L4514"),
-                f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at another "
-                "of 72 crank angles",
+                f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at one "
+                "of 72 crank angles than at both angles with Coswt = +-1",
                 "none, since counts are exact",
                 (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
                 "this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
