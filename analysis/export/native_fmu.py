@@ -29,10 +29,9 @@ from ..run import show_progress
 from .archive import SOURCES, BuildError, common_files, write
 from .bill import add_bill
 from .component import MANIFEST, MEMORY, component, manifest
-from .description import Kind, build_description, description
+from .description import Kind, build_description, description, terminal_files
 from .equations_c import generated_files
 from .interface import interface
-from .terminals import terminal_files
 
 
 class Platform(NamedTuple):

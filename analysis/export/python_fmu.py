@@ -12,11 +12,13 @@ import re
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
+from functools import cache
+from importlib import import_module, resources
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 from pythonfmu.builder import FmuBuilder
 
@@ -28,7 +30,7 @@ from . import controllers
 from .archive import SOURCES, BuildError, common_files, write
 from .bill import add_bill
 from .description import PYTHON, description, token
-from .guard import add_guard
+from .native_fmu import CODE, HEADERS, PLATFORMS, compile_library
 
 #: The oldest Python on which the modules in the FMUs run.
 OLDEST = (3, 10)
@@ -211,3 +213,67 @@ def _import_state() -> Iterator[None]:
         for name in set(sys.modules) - modules:
             if re.search(r"_[0-9a-f]{8}(\.|$)", name):
                 del sys.modules[name]
+
+
+# The guard, ``fmu_src/guard.c``: a C library between the master and PythonFMU's library, whose errors it corrects
+
+
+#: Place of the guard's source in the archive.
+SOURCE = "sources/guard.c"
+#: Name of PythonFMU's library by the folder of its platform.
+PYTHONFMU = {"linux64": "libpythonfmu-export.so", "win64": "pythonfmu-export.dll"}
+
+#: Options in addition to `CODE`. On Windows the guard calls only the system: the C library takes a minute to compile.
+_OPTIONS = {
+    "linux64": ("-Os", "-ldl"),
+    "win64": ("-Os", "-ffreestanding", "-nostdlib", "-lkernel32", "-Wl,--entry,DllMain"),
+}
+
+
+def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
+    """Put the guard in the place of PythonFMU's libraries, which are renamed; return all files by path.
+
+    The source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the master
+    gives.
+
+    Parameters
+    ----------
+    entries : mapping
+        Content of the files by path in the archive, as PythonFMU's builder makes it.
+    model : str
+        Model identifier of the FMU.
+    source : bytes
+        C source of the guard.
+
+    Raises
+    ------
+    BuildError
+        If the source does not compile.
+    """
+    guid = ElementTree.fromstring(entries["modelDescription.xml"]).attrib["guid"]
+    found = {**entries, SOURCE: source, "resources/guid.txt": guid.encode()}
+    for folder, library in compile_guard(source).items():
+        place = f"binaries/{folder}/{model}.{PYTHONFMU[folder].rpartition('.')[2]}"
+        found[f"binaries/{folder}/{PYTHONFMU[folder]}"] = found.pop(place)
+        found[place] = library
+    return found
+
+
+@cache
+def compile_guard(source: bytes, *, kept: bool = True) -> dict[str, bytes]:
+    """Compile the guard for every platform of PythonFMU, or take it from the cache if ``kept``; return libraries by folder."""
+    headers = resources.files("fmpy") / "c-code"
+    made = {}
+    with tempfile.TemporaryDirectory(prefix="linkwork-guard-") as folder:
+        (Path(folder) / "guard.c").write_bytes(source)
+        for name in HEADERS[2]:
+            # the headers need only a type of the C library
+            text = (headers / name).read_text(encoding="utf-8").replace("<stdlib.h>", "<stddef.h>")
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        for platform in PLATFORMS.values():
+            if (place := platform.folder_fmi2) in PYTHONFMU:
+                library = f"guard.{platform.suffix}"
+                options = (*CODE, *_OPTIONS[place])
+                compile_library(folder, ["guard.c"], library, platform.target, options, kept=kept)
+                made[place] = (Path(folder) / library).read_bytes()
+    return made

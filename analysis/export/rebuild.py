@@ -15,9 +15,9 @@ from ..files import check_fmu, first_line
 from .archive import BuildError
 from .bill import BILL
 from .description import NATIVE, NATIVE_FMI3
-from .guard import PYTHONFMU, compile_guard
-from .guard import SOURCE as GUARD
 from .native_fmu import EVERYWHERE, compile_binaries
+from .python_fmu import PYTHONFMU, compile_guard
+from .python_fmu import SOURCE as GUARD
 
 _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
 

@@ -1,9 +1,4 @@
-"""Read and write files: tables of numbers, curves, drawings, and TOML or JSON with units; independent of mechanisms.
-
-``__init__.pyi`` lists the public names; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Read and write files: tables of numbers, curves, drawings, and TOML or JSON with units; independent of mechanisms."""
 
 import lazy_loader
 

@@ -1,9 +1,4 @@
-"""Linear models of a mechanism, and control of a coordinate designed on them.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Linear models of a mechanism, and control of a coordinate designed on them."""
 
 import lazy_loader
 

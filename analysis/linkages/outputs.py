@@ -9,8 +9,7 @@ from .description import is_given
 from .dynamics import Motion
 from .parameters import needs_turns, spring_angle_name
 from .structure import Dyad, Pin, Slider, sliders
-from .symbols import symbol
-from .variables import display_argument
+from .variables import display_argument, symbol
 from .writing import function, quote
 
 

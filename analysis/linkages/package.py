@@ -18,10 +18,9 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS, register
 from ..numerics.cache import code_folder, store_file
-from .contacts import Contacts
 from .description import GROUND, Description, LinkageError, is_given
 from .drawing import Picture
-from .dynamics import Motion
+from .dynamics import Contacts, Motion
 from .equations import PoseWriter, counted_twists
 from .laws import WRITTEN
 from .mistakes import check_entries

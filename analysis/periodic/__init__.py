@@ -1,9 +1,4 @@
-"""Analyse periodic motions of a mechanism: orbits and Floquet multipliers, branches, charts, resonance, stability.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Analyse periodic motions of a mechanism: orbits and Floquet multipliers, branches, charts, resonance, stability."""
 
 import lazy_loader
 

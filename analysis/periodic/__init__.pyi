@@ -31,7 +31,6 @@ from .chart.grid import points_to_confirm as points_to_confirm
 from .motion.discretisation import INTEGRATOR_TOLERANCE as INTEGRATOR_TOLERANCE
 from .motion.discretisation import OrbitAssemblyError as OrbitAssemblyError
 from .motion.discretisation import OrbitError as OrbitError
-from .motion.discretisation import follow_period as follow_period
 from .motion.drive import Drive as Drive
 from .motion.drive import NothingFreeError as NothingFreeError
 from .motion.drive import VaryingInputError as VaryingInputError

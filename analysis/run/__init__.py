@@ -1,9 +1,4 @@
-"""Run mechanisms: inputs, the compiled solver, trajectories, ensembles, co-simulation, standard checks.
-
-The public names are listed in ``__init__.pyi``; a name is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Run mechanisms: inputs, the compiled solver, trajectories, ensembles, co-simulation, standard checks."""
 
 import lazy_loader
 

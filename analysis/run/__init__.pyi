@@ -7,15 +7,15 @@ from .arguments import published_set as published_set
 from .arguments import require_kind as require_kind
 from .arguments import takes_published as takes_published
 from .arguments import variant as variant
-from .case import Case as Case
-from .case import published_case as published_case
 from .case_files import COMMON as COMMON
+from .case_files import Case as Case
 from .case_files import RunTable as RunTable
 from .case_files import case_inputs as case_inputs
 from .case_files import case_mechanism as case_mechanism
 from .case_files import load_case as load_case
 from .case_files import load_parameters as load_parameters
 from .case_files import parameter_tables as parameter_tables
+from .case_files import published_case as published_case
 from .case_files import read_case as read_case
 from .case_files import read_parameters as read_parameters
 from .case_files import save_parameters as save_parameters
@@ -57,6 +57,7 @@ from .experiments import verify as verify
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun
+from .fmu import Messages as Messages
 from .fmu import list_interfaces as list_interfaces
 from .fmu import read_description as read_description
 from .hamming import Hamming as Hamming
@@ -71,7 +72,6 @@ from .masses import describe_masses as describe_masses
 from .masses import mass_origins as mass_origins
 from .masses import trace_masses as trace_masses
 from .masses import with_sections as with_sections
-from .messages import Messages as Messages
 from .prepared import compute_outputs as compute_outputs
 from .sampling import sample as sample
 from .signals import MOTOR as MOTOR

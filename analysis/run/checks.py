@@ -11,8 +11,7 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS
-from .case import Case, published_case
-from .case_files import read_case
+from .case_files import Case, published_case, read_case
 from .cosimulation import Comparison, compare, cosimulate
 from .simulation import simulate
 from .trajectory import Trajectory

@@ -21,7 +21,7 @@ from ..numerics.workers import record_interrupts
 from ..units import Amount, in_si
 from .angles import coordinate_outputs
 from .arguments import complete_initial_state, complete_inputs, require_kind, takes_published, usual_times
-from .case import Case
+from .case_files import Case
 from .events import RunInterrupted, show_progress
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs

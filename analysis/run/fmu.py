@@ -6,17 +6,20 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import chdir
+from ctypes import byref
 from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
+from weakref import WeakValueDictionary
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
 from fmpy import extract, platform, platform_tuple, read_model_description
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi1 import FMICallException, printLogMessage
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.logging import addLoggerProxy
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
@@ -24,7 +27,6 @@ from linkwork.parameters import fmi_name
 from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from .component import ComponentModel, ComponentSlave, component_path
-from .messages import Messages
 
 
 class CosimulationError(LinkworkError):
@@ -315,3 +317,37 @@ class FmuModel(_Instance):
             again, terminate, *_ = self._update()
         self._fmu.enterContinuousTimeMode()
         return terminate
+
+
+# Log messages
+
+
+class Messages(list[str]):
+    """The log messages of one instance of an FMU, in the order in which they came."""
+
+    def receive(self, *arguments: Any) -> None:
+        """Append a message to the list; it is the last argument in FMI 2.0 and in FMI 3.0."""
+        self.append(arguments[-1].decode("utf-8", errors="replace"))
+
+    def callbacks(self) -> Any:
+        """Return the FMI 2.0 callbacks for FMPy's `instantiate`; keep a reference to them as long as the instance lives."""
+        found = fmi2CallbackFunctions(logger=_LOGGER, componentEnvironment=id(self))
+        addLoggerProxy(byref(found))
+        _listeners[id(self)] = self
+        return found
+
+
+_listeners: WeakValueDictionary[int, Messages] = WeakValueDictionary()
+
+
+def _receive(environment: int | None, *arguments: Any) -> None:
+    listener = _listeners.get(environment or 0)
+    if listener is None:
+        printLogMessage(environment, *arguments)
+    else:
+        listener.receive(*arguments)
+
+
+#: Logger for all instances. FMPy's proxy, which formats the messages, calls only the logger that it was given last. This logger
+#: therefore lives as long as the process and finds each instance by its environment; messages of other FMUs are printed.
+_LOGGER = fmi2CallbackLoggerTYPE(_receive)

@@ -1,9 +1,4 @@
-"""Analyse the generalised slider-crank: force problems, mobility, tolerances, and the thesis's dual-number method.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Analyse the generalised slider-crank: force problems, mobility, tolerances, and the thesis's dual-number method."""
 
 import lazy_loader
 

@@ -424,11 +424,8 @@ def force_turn(
     th = _crank_angles(angles)
     n = th.size
     w, e = array_per_angle("crank_speed", crank_speed, n), array_per_angle("crank_acceleration", crank_acceleration, n)
-    given = (
-        array_per_angle("torque", torque, n)
-        if torque is not None
-        else array_per_angle("load", 0.0 if load is None else load, n)
-    )
+    known, value = ("load", 0.0 if load is None else load) if torque is None else ("torque", torque)
+    given = array_per_angle(known, value, n)
     moving = ShiftMotion(
         *(array_per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
     )

@@ -7,11 +7,7 @@
 >>> result = synthesize(TimedPath(points=ellipse), constraints=[LargestLink(length=1.1285), LeastTransmission()])
 >>> round(1e4 * result.best.error, 2)
 0.44
-
-The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
 """
-
-from __future__ import annotations
 
 import lazy_loader
 

@@ -1,9 +1,4 @@
-"""Systems of connected FMUs: description, SSP files, a co-simulation master, and the errors of its couplings.
-
-The public names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Systems of connected FMUs: description, SSP files, a co-simulation master, and the errors of its couplings."""
 
 import lazy_loader
 

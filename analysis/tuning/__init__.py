@@ -1,9 +1,4 @@
-"""Find the least change of parameters that keeps a range of speeds free of resonance, jumps and instability.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Find the least change of parameters that keeps a range of speeds free of resonance, jumps and instability."""
 
 import lazy_loader
 

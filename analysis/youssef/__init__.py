@@ -1,9 +1,4 @@
-"""Youssef's theory of the five-bar slider: linear equation, harmonic balance, Hill's regions, accessible area.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Youssef's theory of the five-bar slider: linear equation, harmonic balance, Hill's regions, accessible area."""
 
 import lazy_loader
 

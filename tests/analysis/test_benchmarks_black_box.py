@@ -1,21 +1,19 @@
-"""Differential evolution and the downhill simplex: their quality function against the exact one, and known linkages found."""
+"""Differential evolution and the downhill simplex: their quality function against the exact one, and their first simplex."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import radians
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult
 
 import analysis.synthesis as syn
 from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.start import make_linkage, make_start
+from analysis.synthesis.search.start import make_start
 from analysis.synthesis.task.limits import make_limits
-from benchmarks.black_box import BlackBox, descend, evolve, initial_simplex
+from benchmarks.black_box import BlackBox, initial_simplex
 from tests.linkages import drawn, ellipse
 
 FloatArray = NDArray[np.float64]
@@ -138,22 +136,3 @@ class TestGrading:
             black = box(TASK, constraint)
             assert (black.violations(unknowns(black, good)) <= 0.0).all(), constraint
             assert (black.violations(unknowns(black, bad)) > 0.0).any(), constraint
-
-
-def evolved(black: BlackBox, random: np.random.Generator) -> OptimizeResult:
-    return evolve(black, random, maxiter=60)
-
-
-class TestSearch:
-    @pytest.mark.parametrize("search", [evolved, descend])
-    def test_a_rocker_function_of_a_known_linkage_is_found(self, search: Any) -> None:
-        linkage = syn.Linkage(
-            ground_length=0.1, crank_length=0.03, coupler_length=0.09, rocker_length=0.07, crank_phase=0.8
-        )
-        task = syn.RockerFunction(angle=linkage.rocker_angle(syn.turn(24)))
-        boxes = [box(task, *syn.USUAL, branch=branch) for branch in (1, -1)]
-        answers = [boxes[k % 2].answer(search(boxes[k % 2], np.random.default_rng([0, k]))) for k in range(8)]
-        best = min((answer for answer in answers if answer.feasible), key=lambda answer: answer.start.quality)
-        found = make_linkage(best.start, boxes[0].normal)
-        assert np.abs(found.rocker_angle(syn.turn(24)) - task.angle).max() < 0.02
-        assert found.least_transmission > radians(39.9)

@@ -39,7 +39,7 @@ from analysis.periodic import (
     newton_orbit,
     special_gradient,
 )
-from analysis.periodic.motion.discretisation import follow_period, operating_point
+from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.drive import motion_scales
 from analysis.periodic.motion.variables import parameter_unit, parameter_value, with_values
 from analysis.periodic.stability import sensitivity as gradients
@@ -252,7 +252,7 @@ def relocated(orbit: PeriodicOrbit, kind: Crossing, along: str, name: str, value
         return with_values(parameters, drive, {along: float(z[-1] * scale[-1])})
 
     def residual(z: FloatArray) -> FloatArray:
-        period = follow_period(*operation(z), z[:-1] * scale[:-1], orbit.turns)
+        period = operating_point(*operation(z)).period(z[:-1] * scale[:-1], orbit.turns)
         return np.append(period.shift / scale[:-1], crossing_test(period.monodromy, kind))
 
     found = root(residual, np.append(orbit.start, here) / scale, tol=1e-13, options={"eps": 1e-7}).x

@@ -23,7 +23,7 @@ from analysis.periodic import (
     special_gradient,
 )
 from analysis.run import load_case
-from analysis.run.case import Case
+from analysis.run.case_files import Case
 from analysis.tuning import Wish, tune
 
 SHAKER = """

@@ -18,8 +18,8 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 import linkwork
+from analysis.export import description as terminals
 from analysis.export import description as writer
-from analysis.export import terminals
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from build_fmu import FMUS
 from linkwork.mechanism import Mechanism

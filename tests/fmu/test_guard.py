@@ -15,7 +15,7 @@ import pytest
 
 from analysis import CosimulationError
 from analysis.export import NATIVE, PLATFORMS, SOURCES, build_native, compile_library, run_trial, this_platform
-from analysis.export.guard import PYTHONFMU, compile_guard
+from analysis.export.python_fmu import PYTHONFMU, compile_guard
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import cosimulation, unpacking_folder
 

@@ -1,9 +1,4 @@
-"""Chart periodic motions over two parameters: grids of multipliers, stability boundaries, coexisting motions, basins.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Chart periodic motions over two parameters: grids of multipliers, stability boundaries, coexisting motions, basins."""
 
 import lazy_loader
 

@@ -1,9 +1,4 @@
-"""Find periodic motions of a driven mechanism, one or all of them, with their Floquet multipliers.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Find periodic motions of a driven mechanism, one or all of them, with their Floquet multipliers."""
 
 import lazy_loader
 

@@ -32,7 +32,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ...mechanisms import MECHANISMS, Parameters, find_mechanism
-from ...run import repeats, takes_published
+from ...run import repeats
 from . import collocation, kernels
 from .drive import Direction, Drive, flow_scales, is_smooth, require_drive
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
@@ -262,34 +262,6 @@ def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> Ope
     """Rebuild an operating point from a pickle; register its mechanism if this process does not know it."""
     MECHANISMS.setdefault(mechanism.name, mechanism)
     return operating_point(parameters, drive)
-
-
-@takes_published()
-def follow_period(
-    parameters: Parameters,
-    drive: Drive,
-    start: FloatArray,
-    turns: int,
-    direction: Direction | None = None,
-    along: float = 1.0,
-) -> Period:
-    """Follow the mechanism over one period from a start that need not be on a periodic orbit.
-
-    Parameters
-    ----------
-    start : ndarray, shape (n,)
-        y at crank angle 0.
-    turns : int
-        Number of common periods, `Flow.period`, in the period.
-    direction, along
-        As in `OperatingPoint.section`.
-
-    Raises
-    ------
-    OrbitError
-        If the integration over the period fails.
-    """
-    return operating_point(parameters, drive).period(start, turns, direction, along)
 
 
 def can_collocate(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:

@@ -1,9 +1,4 @@
-"""Follow periodic motions over one parameter: branches, resonances, special points, and values that a machine should avoid.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Follow periodic motions over one parameter: branches, resonances, special points, and values that a machine should avoid."""
 
 import lazy_loader
 

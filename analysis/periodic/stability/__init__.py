@@ -1,9 +1,4 @@
-"""Compute gradients of motions with respect to all parameters, normal forms at a loss of stability, and long runs beyond it.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Compute gradients of motions with respect to all parameters, normal forms at a loss of stability, and long runs beyond it."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Figures of chapter III: the five-bar slider of Table 3.1 driven at 420 rpm, and the figures of `free_crank`."""
+"""Figures of chapter III: the five-bar slider of Table 3.1 driven at 420 rpm, and those of `launches` and `free_crank`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ_DEG, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns, result_curves
 from ..variation import cache, compared_values
-from . import free_crank
+from . import free_crank, launches
 from .runs import (
     ALIKE_WORDS,
     SIGN,
@@ -783,6 +783,7 @@ STUDIES = {
         Study("3.3", weightless_result, draw_drift, sweeps=("slider.damping", "gravity")),
         Study("3.4", steady_result, draw_steady),
         Study("3.5", torque_result, draw_torque, sweeps=("slider.stiffness",)),
+        *launches.STUDIES,
         *free_crank.STUDIES,
     )
 }

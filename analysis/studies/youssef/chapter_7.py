@@ -404,6 +404,15 @@ def two_positions() -> StudyResult:
     )
 
 
+def _upright_errors(rotation: FloatArray, places: ComplexArray) -> FloatArray:
+    """Return the least distance (l3) from points to P with an upright rocker, by (7.15); NaN if it cannot be assembled."""
+    pins = LINKAGE.crank_length * np.exp(1j * rotation)[:, None]
+    with np.errstate(invalid="ignore"):
+        arms = solve_slider_equations(rotation, places)[0] + 1j * LINKAGE.rocker_length - pins
+    reached = pins + LINKAGE.point_distance / LINKAGE.coupler_length * arms
+    return np.asarray(np.abs(reached - places[:, None]).min(axis=1))
+
+
 def _positions() -> tuple[Statement, ...]:
     """Judge (7.14) and (7.15) with random points."""
     targets = np.random.default_rng(75).uniform(-1.0, 1.0, (ROTATION.size, 2))
@@ -419,15 +428,7 @@ def _positions() -> tuple[Statement, ...]:
     heights = (
         np.abs((pins[missing] + LINKAGE.coupler_length * pointing / np.abs(pointing)).imag) / LINKAGE.rocker_length
     )
-    # (7.15) has no real U where the upright rocker cannot be assembled
-    with np.errstate(invalid="ignore"):
-        arms = (
-            solve_slider_equations(ROTATION[missing], places[missing])[0]
-            + 1j * LINKAGE.rocker_length
-            - pins[missing, None]
-        )
-    reached = pins[missing, None] + LINKAGE.point_distance / LINKAGE.coupler_length * arms
-    by_7_15 = np.abs(reached - places[missing, None]).min(axis=1) - least[missing]
+    by_7_15 = _upright_errors(ROTATION[missing], places[missing]) - least[missing]
     fine = "1e-3 l3: near the least error, P moves by at most {:.2g} l3 from one slider position to the next"
     lines = [
         f"{side.sum()} points {where}" for side, where in ((above, "above the slider's line"), (~above, "below it"))

@@ -29,7 +29,8 @@ from .chapter_3 import (
 from .chapter_6 import TABLE, ratios_to_least, share_of_stated
 from .conclusions_linear import judge_introduction, judge_linearised
 from .formulation import judge_closure, judge_multipliers
-from .free_crank import TORQUES, Turns, launch, run_acceleration, run_peak
+from .free_crank import Turns
+from .launches import TORQUES, launch, run_acceleration, run_peak
 from .problems import AREA_N, PROBLEMS
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
@@ -101,11 +102,8 @@ def ellipse_error(semi_axis: float) -> float:
     )
 
 
-def judge_kinematics() -> tuple[Statement, ...]:
-    """Judge the conclusions on synthesis and control."""
-    ratios = ratios_to_least()
-    shares = [*(share_of_stated(row.problem) for row in TABLE.values()), *shares_of_stated().values()]
-    kept = sum(share <= 1.0 + ABOUT for share in shares)
+def judge_second_input() -> tuple[Statement, ...]:
+    """Judge the conclusions on the slider as a second input."""
     return (
         Statement(
             "The releasing of some constraints in linkage mechanisms and treating them as inputs that may be controlled "
@@ -151,6 +149,15 @@ def judge_kinematics() -> tuple[Statement, ...]:
             text("9.1, L7020"),
             why="this is a choice; no other order is tried",
         ),
+    )
+
+
+def judge_synthesis() -> tuple[Statement, ...]:
+    """Judge the conclusions on the synthesis of linkages."""
+    ratios = ratios_to_least()
+    shares = [*(share_of_stated(row.problem) for row in TABLE.values()), *shares_of_stated().values()]
+    kept = sum(share <= 1.0 + ABOUT for share in shares)
+    return (
         Statement(
             "As a result an optimisation method was developed, the output of which gave a planar linkage that minimised the "
             "errors involved in function or path generation.",
@@ -387,7 +394,8 @@ def compute() -> StudyResult:
         ),
         statements=(
             *judge_introduction(),
-            *judge_kinematics(),
+            *judge_second_input(),
+            *judge_synthesis(),
             *judge_equations(),
             *judge_constant_speed(),
             *judge_launches(),

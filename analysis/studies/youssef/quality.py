@@ -158,87 +158,91 @@ def count_late_violations() -> int:
 def compute() -> StudyResult:
     """Compute both quality functions of the linkages, and judge the statements."""
     q = {name: qualities(linkage) for name, linkage in linkages().items()}
-    found, timed, path = q["ours; combined"], q["ours; timed"], q["ours; path"]
     columns = {
         f"{name} {what} [cm2]": [getattr(value, what)] for name, value in q.items() for what in ("timed", "area")
     }
-    ratios = {f"Fig {n}": printed_error(row.problem) / descent_error(row.problem) for n, row in TABLE.items()}
     return StudyResult(
         number=NUMBER,
         claim="The quality functions of function and path generation may be combined into one. The example is ellipse (a).",
         assignment="The thesis gives no example. Problem, equal weights and the limit of the links are our choice.",
         columns=pad_columns(columns),
-        statements=(
-            Statement(
-                "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. "
-                "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
-                "specified times.",
-                text("6.2.2, L4205"),
-                "area between curve and ellipse (a) of the linkage with the least error (6.6), relative to the least area. "
-                f"Both are the least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link "
-                f"above {CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
-                f"above {1.0 + ALIKE:g}, the rule for *the same*, since a condition that costs nothing would leave the area "
-                "unchanged",
-                (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
-                "that minimisation yields a minimum is not judged, since it claims nothing",
+        statements=judge_qualities(q["ours; timed"], q["ours; path"], q["ours; combined"]),
+    )
+
+
+def judge_qualities(timed: Quality, path: Quality, found: Quality) -> tuple[Statement, ...]:
+    """Judge the statements on the quality functions, by our best linkages for the time, for the path, and for both."""
+    ratios = {f"Fig {n}": printed_error(row.problem) / descent_error(row.problem) for n, row in TABLE.items()}
+    return (
+        Statement(
+            "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. "
+            "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
+            "specified times.",
+            text("6.2.2, L4205"),
+            "area between curve and ellipse (a) of the linkage with the least error (6.6), relative to the least area. "
+            f"Both are the least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link "
+            f"above {CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
+            f"above {1.0 + ALIKE:g}, the rule for *the same*, since a condition that costs nothing would leave the area "
+            "unchanged",
+            (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
+            "that minimisation yields a minimum is not judged, since it claims nothing",
+        ),
+        Statement(
+            "An approximation to the desired output may, therefore, be obtained by taking both function and path "
+            "generation into consideration.",
+            text("6.2.2, L4243"),
+            "error in time (6.6) and area of the linkage that is best for their sum, within the same limits",
+            "at most the errors that the thesis states for linkages found for one of them, and calls favourable (L4864) "
+            "and tolerable (L5043)",
+            (
+                at_most("error in time, as at Fig 6.4", str(TIMED.error), found.timed, "cm2"),
+                at_most("area, as at Fig 6.9", str(PATH.error), found.area, "cm2"),
             ),
-            Statement(
-                "An approximation to the desired output may, therefore, be obtained by taking both function and path "
-                "generation into consideration.",
-                text("6.2.2, L4243"),
-                "error in time (6.6) and area of the linkage that is best for their sum, within the same limits",
-                "at most the errors that the thesis states for linkages found for one of them, and calls favourable (L4864) "
-                "and tolerable (L5043)",
-                (
-                    at_most("error in time, as at Fig 6.4", str(TIMED.error), found.timed, "cm2"),
-                    at_most("area, as at Fig 6.9", str(PATH.error), found.area, "cm2"),
-                ),
+        ),
+        Statement(
+            "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
+            text("6.3.2, L4514"),
+            f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at one "
+            "of 72 crank angles than at both angles with Coswt = +-1",
+            "none, since counts are exact",
+            (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
+            "this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
+        ),
+        Statement(
+            "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
+            "in solving the system equations if the constraints are violated at later stages in the crank cycle. However, "
+            "(b) [the constraint (6.14)] is a straightforward evaluation of a constant relation and it is clearly "
+            "preferable.",
+            text("6.3.2, L4541-4549"),
+            "of the same four-bars: the number that close at the first of the 72 crank angles but not at all of them; the "
+            "number for which (6.14) and these angles disagree; values of C that (b) takes over those of (a)",
+            "one, enough for *may be*; none of a count; at most 1, since (b) is preferable",
+            (
+                at_least("violated at later stages", 1.0, count_late_violations()),
+                near("(6.14) disagrees", 0.0, count_wrong_extremes(), 0.0),
+                at_most("values of C", 1.0, 2.0 / 72.0),
             ),
-            Statement(
-                "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
-                text("6.3.2, L4514"),
-                f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at one "
-                "of 72 crank angles than at both angles with Coswt = +-1",
-                "none, since counts are exact",
-                (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
-                "this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
+        ),
+        Statement(
+            "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
+            "planar linkage yielding in all cases a minimum.",
+            text("6.5, L5136"),
+            "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent "
+            f"has at most {STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within "
+            "the printed bounds",
+            f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
+            (
+                *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
+                Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
+                Case(label="other types of linkage", computed=None, why="none is given"),
             ),
-            Statement(
-                "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
-                "in solving the system equations if the constraints are violated at later stages in the crank cycle. However, "
-                "(b) [the constraint (6.14)] is a straightforward evaluation of a constant relation and it is clearly "
-                "preferable.",
-                text("6.3.2, L4541-4549"),
-                "of the same four-bars: the number that close at the first of the 72 crank angles but not at all of them; the "
-                "number for which (6.14) and these angles disagree; values of C that (b) takes over those of (a)",
-                "one, enough for *may be*; none of a count; at most 1, since (b) is preferable",
-                (
-                    at_least("violated at later stages", 1.0, count_late_violations()),
-                    near("(6.14) disagrees", 0.0, count_wrong_extremes(), 0.0),
-                    at_most("values of C", 1.0, 2.0 / 72.0),
-                ),
-            ),
-            Statement(
-                "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
-                "planar linkage yielding in all cases a minimum.",
-                text("6.5, L5136"),
-                "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent "
-                f"has at most {STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within "
-                "the printed bounds",
-                f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
-                (
-                    *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
-                    Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
-                    Case(label="other types of linkage", computed=None, why="none is given"),
-                ),
-                "how well they generate the outputs is judged at Figs 6.4 to 6.9",
-            ),
-            Statement(
-                "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
-                "satisfactory result.",
-                text("6.5, L5140"),
-                why="no example is given; the strategy of 7.4 is judged at L6026",
-            ),
+            "how well they generate the outputs is judged at Figs 6.4 to 6.9",
+        ),
+        Statement(
+            "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
+            "satisfactory result.",
+            text("6.5, L5140"),
+            why="no example is given; the strategy of 7.4 is judged at L6026",
         ),
     )
 

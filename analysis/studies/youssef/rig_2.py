@@ -64,7 +64,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
         number=number,
         claim=f"Theory and experiment agree up to resonance, {NATURAL[spring][0]} rpm; beyond it theory is smaller.",
         columns=pad_columns(columns),
-        statements=_resonance() if spring == "C" else (),
+        statements=(*_beyond_resonance(), *_natural_frequencies()) if spring == "C" else (),
         see="" if spring == "C" else "8.19",
     )
 
@@ -86,8 +86,8 @@ def width(spring: str, linear: Variant | None = None, /, **changes: float) -> fl
     return float(np.ptp(fine[shape >= shape.max() / sqrt(2.0)]))
 
 
-def _resonance() -> tuple[Statement, ...]:
-    """Judge the statements on Fig 8.19 and 8.20."""
+def _beyond_resonance() -> tuple[Statement, ...]:
+    """Judge the statements on the amplitude of Fig 8.19 and 8.20 up to resonance and beyond it."""
     section, larger = "8.4.2.2", "above 1, the sign alone, as *smaller* says"
     over, exact = {}, []
     for s in "CD":
@@ -100,12 +100,6 @@ def _resonance() -> tuple[Statement, ...]:
             for w in BEYOND[s]
         ]
     beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
-    natural = {s: rigs.natural_speed(s) for s in "CD"}
-    around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.stiffness_range(s)] for s in "CD"}
-    error = {
-        s: max(abs(length(s) * linear_motion(s, w).amplitude / rigs.amplitude(rigs.turn(s, w)) - 1.0) for w in RANGE)
-        for s in "CD"
-    }
     return (
         Statement(
             "The experimental and theoretical curves agree in the region of speed leading up to resonance at [omega = "
@@ -144,6 +138,19 @@ def _resonance() -> tuple[Statement, ...]:
             _factors(),
             "no one factor does both",
         ),
+    )
+
+
+def _natural_frequencies() -> tuple[Statement, ...]:
+    """Judge the statements on the natural frequencies of Fig 8.19 and 8.20, and on the linear theory as a whole."""
+    section = "8.4.2.2"
+    natural = {s: rigs.natural_speed(s) for s in "CD"}
+    around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.stiffness_range(s)] for s in "CD"}
+    error = {
+        s: max(abs(length(s) * linear_motion(s, w).amplitude / rigs.amplitude(rigs.turn(s, w)) - 1.0) for w in RANGE)
+        for s in "CD"
+    }
+    return (
         Statement(
             "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
             "of 825 RPM with spring D.",

@@ -242,11 +242,7 @@ def _rocker() -> tuple[Statement, ...]:
                     why="the series printed for the rocker function raises the error",
                 ),
                 at_most("path (b), printed series", 1.0 - ALIKE, lowered),
-                *(
-                    at_most(NAMES[name], 1.0 - ALIKE, share)
-                    for name, share in error_ratios().items()
-                    if name not in SERIES
-                ),
+                *(at_most(NAMES[name], 1.0 - ALIKE, x) for name, x in error_ratios().items() if name not in SERIES),
             ),
         ),
         Statement(

@@ -1,9 +1,4 @@
-"""Read the case files of a synthesis: their task, constraints and search.
-
-The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Read the case files of a synthesis: their task, constraints and search."""
 
 import lazy_loader
 

@@ -1,9 +1,4 @@
-"""Find linkages in closed form: rigid-body guidance, function generation, cognates, quick returns.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Find linkages in closed form: rigid-body guidance, function generation, cognates, quick returns."""
 
 import lazy_loader
 

@@ -1,9 +1,4 @@
-"""Model planar linkages: dimensions, motion and coupler curves, compiled; masses and pin forces.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Model planar linkages: dimensions, motion and coupler curves, compiled; masses and pin forces."""
 
 import lazy_loader
 

@@ -325,11 +325,6 @@ class PinForces:
         """Return the letter of the pin with the greatest force."""
         return PINS[int(self.force.max(axis=0).argmax())]
 
-    @property
-    def rotation_at_greatest(self) -> float:
-        """Return the crank's rotation at the greatest force (rad)."""
-        return float(self.rotation[int(self.force.max(axis=1).argmax())])
-
     def greatest_force(self, pins: str) -> float:
         """Return the greatest force on any of the pins whose letters are in ``pins`` (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())

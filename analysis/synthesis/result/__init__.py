@@ -1,9 +1,4 @@
-"""Evaluate solutions: errors and defects of a linkage in its task, cost of dimensional errors, reports and drawings.
-
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Evaluate solutions: errors and defects of a linkage in its task, cost of dimensional errors, reports and drawings."""
 
 import lazy_loader
 

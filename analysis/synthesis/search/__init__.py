@@ -1,9 +1,4 @@
-"""Search for linkages: scan for starts in closed form, optimise from the starts, and compute trade-offs.
-
-The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Search for linkages: scan for starts in closed form, optimise from the starts, and compute trade-offs."""
 
 import lazy_loader
 

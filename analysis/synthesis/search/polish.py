@@ -162,7 +162,8 @@ def polish(
         cores = search.cores
         size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
         # a polisher holds compiled solvers, which cannot be sent to a process: each part of the work makes its own
-        step = getattr(worker, name) if cores == 1 else partial(_call_polisher, name, normal, limits, pivot)
+        made = (lambda: worker) if cores == 1 else partial(Polisher, normal, limits, pivot)
+        step = partial(_call_polisher, name, made)
         parts, interrupted = run_on_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
@@ -173,7 +174,7 @@ def polish(
     races = normal.outline is not None and normal.quality != "squares" and pivot is None and normal.straight is None
     enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
-    found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
+    found, interrupted = spread("fit", fitted, f"fitting {len(fitted)} starts")
     kept = feasible_answers(found)
     # an interruption after the last search is ignored
     if interrupted and len(found) < len(fitted):
@@ -186,7 +187,7 @@ def polish(
     elif not races:
         best = [*given, *distinct_answers(kept, ONWARDS, pivot)]
         kept, interrupted = spread(
-            "minimise_measures", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
+            "minimise_measure", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
         )
     else:
         begin = feasible_answers([worker.with_measure(answer) for answer in [*kept, *begun]])
@@ -194,7 +195,7 @@ def polish(
         kept, interrupted = _refine_in_laps(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
         best = distinct_answers(feasible_answers(kept) or feasible_answers(found), ONWARDS, pivot)
-        kept, interrupted = spread("minimise_objectives", best, f"minimising the {limits.least.along.name}")
+        kept, interrupted = spread("minimise_objective", best, f"minimising the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.bounds_rotations:
         kept = [answer for answer in kept if worker.judge_start(answer.start).feasible]
@@ -218,7 +219,7 @@ def _refine_in_laps(
         best = distinct_answers([*given, *kept], count + len(given), distance=RACED)
         stage = "refining" if lap else "comparing"
         done, interrupted = spread(
-            "minimise_measures", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
+            "minimise_measure", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
         )
         if interrupted:
             return [*done, *kept], True
@@ -234,9 +235,10 @@ def feasible_answers(answers: Sequence[Answer]) -> list[Answer]:
 
 
 @ONE_THREAD
-def _call_polisher(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
-    """Call the method ``name`` of a new `Polisher` with an item; for use in another process or thread."""
-    return getattr(Polisher(normal, limits, pivot), name)(item)
+def _call_polisher(name: str, make: Callable[[], Polisher], items: Sequence[Any]) -> list[Answer]:
+    """Call the method ``name`` of the `Polisher` that ``make`` returns for each item, also in another process or thread."""
+    method = getattr(make(), name)
+    return [method(item) for item in items]
 
 
 def distinct_answers(
@@ -307,10 +309,6 @@ class Polisher:
                 return replace(met, start=replace(met.start, quality=self.program("squares").value(met.start)))
         return answer
 
-    def fit_all(self, starts: Sequence[Start]) -> list[Answer]:
-        """Fit every start; see `fit`."""
-        return [self.fit(start) for start in starts]
-
     def _solve_squares(self, start: Start) -> Answer:
         """Minimise the squared errors by IPOPT.
 
@@ -355,11 +353,8 @@ class Polisher:
         last = self.program("squares", exact=True)
         return last.settle_extremes(answer, lambda start, places: last.solve(start, places=places))
 
-    def minimise_objectives(self, answers: Sequence[Answer]) -> list[Answer]:
-        """Minimise, from each answer, the objective `Limits.least`, which replaces the error."""
-        return [self._minimise_objective(answer) for answer in answers]
-
-    def _minimise_objective(self, answer: Answer) -> Answer:
+    def minimise_objective(self, answer: Answer) -> Answer:
+        """Minimise, from an answer, the objective `Limits.least`, which replaces the error."""
         program = self.program("least", exact=True)
         size = program.greatest_value(answer.start)
         found = program.solve(answer.start, size=size)
@@ -387,11 +382,9 @@ class Polisher:
         curve, _ = self.refinement.trace(*self.refinement.program.unknowns_and_parameters(answer.start))
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
-    def minimise_measures(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
-        """Minimise the area or the greatest error from each answer; ``items`` are pairs of answer and limit of iterations."""
-        return [self._minimise_measure(*item) for item in items]
-
-    def _minimise_measure(self, answer: Answer, iterations: int) -> Answer:
+    def minimise_measure(self, item: tuple[Answer, int]) -> Answer:
+        """Minimise the area or the greatest error from an answer; ``item`` is the answer and the limit of iterations."""
+        answer, iterations = item
         if self.normal.outline is not None:
             refinement = self.refinement
             found = refinement.refine(answer, iterations=iterations)

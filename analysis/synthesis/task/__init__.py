@@ -1,9 +1,4 @@
-"""Define the problem of a synthesis: targets and tasks, constraints and bounds, and their normal form.
-
-The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
-"""
-
-from __future__ import annotations
+"""Define the problem of a synthesis: targets and tasks, constraints and bounds, and their normal form."""
 
 import lazy_loader
 
