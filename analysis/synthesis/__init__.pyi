@@ -106,7 +106,6 @@ from .task.target import area_difference as area_difference
 from .task.target import curve_distance as curve_distance
 from .task.target import hausdorff as hausdorff
 from .task.target import straight_parts as straight_parts
-from .task.target import straightest_part as straightest_part
 from .task.target import straightness as straightness
 from .task.task import Motion as Motion
 from .task.task import PrecisionPoints as PrecisionPoints

@@ -12,7 +12,6 @@ from .hill import Region as Region
 from .hill import SingularEquationError as SingularEquationError
 from .hill import boundary_stiffnesses as boundary_stiffnesses
 from .hill import determinant as determinant
-from .hill import hill_determinant as hill_determinant
 from .hill import hill_multipliers as hill_multipliers
 from .hill import hill_regions as hill_regions
 from .hill import monodromies as monodromies

@@ -1,8 +1,8 @@
 """Linear equations with periodic coefficients, a y'' + b y' + (c + lambda s) y = 0 with period 2 pi (Youssef, chapter V).
 
 Three methods determine their stability and share only the coefficients: integration of the monodromy matrix (`monodromies`),
-Hill's infinite determinant truncated at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
-perturbation for small harmonics (`perturbed_boundary`, `perturbed_region`).
+Hill's infinite determinant truncated at an order (`hill_multipliers`, `boundary_stiffnesses`), and perturbation for small
+harmonics (`perturbed_boundary`, `perturbed_region`).
 
 A region of parametric instability has a number N. If the harmonics of the coefficients vanish, the region shrinks to the
 stiffness at which the natural frequency is N/2 times the frequency of the coefficients. On its boundaries one Floquet
@@ -245,34 +245,6 @@ def operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.c
     a, b, c = (_toeplitz(series, len(k)) for series in (equation.a, equation.b, equation.c))
     matrix: NDArray[np.complex128] = -a * k**2 + 1j * b * k + c
     return matrix
-
-
-def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int | None = None) -> float:
-    """Return Hill's determinant in exponential form, which is zero if the equation has the given Floquet multiplier.
-
-    Row k is divided by -a0 (k^2 + 1). Only the sign of a determinant, and the ratio of two determinants of the same order, are
-    meaningful: for equations that differ by a constant in c, the ratios tend to the ratios of det(Phi - multiplier I) as the
-    order grows.
-
-    Parameters
-    ----------
-    equation : PeriodicEquation
-        Equation, which may have damping.
-    multiplier : int
-        +1 for motions of period 2 pi, -1 for motions of period 4 pi.
-    order : int, optional
-        Highest harmonic.
-
-    Raises
-    ------
-    InputError
-        If the multiplier is neither +1 nor -1, or the order is not positive.
-    """
-    require_sign(multiplier)
-    k = _harmonics(multiplier, _order(equation, order))
-    scaled = operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
-    # the determinant is real: the matrix rotated by half a turn is its complex conjugate
-    return float(np.linalg.det(scaled).real)
 
 
 def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) -> NDArray[np.complex128]:

@@ -30,7 +30,6 @@ from analysis.youssef import (
     SliderEquation,
     boundary_stiffnesses,
     determinant,
-    hill_determinant,
     hill_multipliers,
     hill_regions,
     monodromies,
@@ -165,23 +164,6 @@ def test_hills_multipliers_are_those_of_the_monodromy(seed: int) -> None:
     # sum and product: where two multipliers meet each of them is known to the root of rounding only
     assert by_hill.sum() == pytest.approx(np.trace(matrix), rel=1e-6, abs=1e-6)
     assert by_hill.prod() == pytest.approx(np.linalg.det(matrix), rel=1e-6, abs=1e-6)
-
-
-@pytest.mark.parametrize("multiplier", [1, -1])
-def test_hills_determinant_is_that_of_the_monodromy(multiplier: int) -> None:
-    """Both are entire functions of the stiffness with the same zeros: their ratio does not depend on it.
-
-    What the truncation leaves of the product over the harmonics k, of c/k^2 each, falls with the inverse of the order.
-    """
-    equations = [GENERAL.stiffened(x) for x in (-0.8, 0.1, 0.55, 1.9, 3.2)]
-    by_floquet = crossing_test(monodromies(equations), multiplier)
-
-    def spread(order: int) -> float:
-        ratio = np.array([hill_determinant(e, multiplier, order=order) for e in equations]) / by_floquet
-        return float(np.ptp(ratio) / abs(ratio.mean()))
-
-    assert spread(160) < 0.05
-    assert spread(40) / spread(160) == pytest.approx(4.0, abs=0.3)
 
 
 def test_boundaries_with_damping_are_where_the_multiplier_is() -> None:
@@ -327,7 +309,7 @@ def test_bad_arguments_are_refused() -> None:
     with pytest.raises(InputError, match="finite numbers"):
         liouville([])
     with pytest.raises(InputError, match=r"\+1 or -1"):
-        hill_determinant(GENERAL, 2)
+        boundary_stiffnesses(GENERAL, 2, count=1)
     with pytest.raises(InputError, match="order is 0"):
         hill_multipliers(GENERAL, order=0)
     with pytest.raises(InputError, match="at least one equation"):

@@ -553,47 +553,14 @@ def _narrowest_direction(points: FloatArray) -> float:
     return atan2(y, x)
 
 
-def straightest_part(
-    curve: ArrayLike,
-    count: int,
-    *,
-    direction: float | None = None,
-    least_travel: float = 0.0,
-    closed: bool = True,
-) -> Straightness:
-    """Find the flattest part of a curve that consists of ``count`` successive points.
-
-    Parameters
-    ----------
-    curve : array_like, shape (n, 2)
-        Points of the curve (m), for example at equal steps of the crank angle.
-    count : int
-        Number of points of the part: for a range of 120 deg at 5 deg steps it is 25.
-    direction : float, optional
-        As for `straightness`.
-    least_travel : float
-        Least travel of the part (m).
-    closed : bool
-        Whether a part may continue from the curve's last point to its first.
-
-    Raises
-    ------
-    InputError
-        If the curve has fewer than ``count`` points, or no part has the least travel.
-    """
-    parts = straight_parts(curve, count, direction=direction, closed=closed)
-    longest = max(part.travel for part in parts)
-    if not longest >= least_travel:
-        raise InputError(
-            f"no part of {count} points has a travel of {least_travel!r} m: the longest is {longest:.6g} m"
-        )
-    return min((part for part in parts if part.travel >= least_travel), key=lambda part: part.flatness)
-
-
 def straight_parts(
     curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
 ) -> list[Straightness]:
-    """Return travel and flatness of every part of a curve with ``count`` successive points; see `straightest_part`."""
+    """Return travel and flatness of every part of a curve that consists of ``count`` successive points.
+
+    ``curve`` has the shape (n, 2), in m; for ``direction`` see `straightness`. In a ``closed`` curve a part may continue from
+    the last point to the first. Raises InputError if the curve has fewer than ``count`` points.
+    """
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):
         raise InputError(f"a part of {count} points of {len(points)}: it must be from 2 to all of them")
