@@ -117,7 +117,7 @@ def examples(dest: str, force: bool) -> None:
     there = [str(path) for path in files if (folder / path).exists()]
     if there and not force:
         names = ", ".join(there[:5]) + (f" and {len(there) - 5} more" if len(there) > 5 else "")
-        raise click.UsageError(f"{folder} has {names} already: give --force to write over them, or --dest")
+        raise click.UsageError(f"{folder} already has {names}: give --force to overwrite them, or --dest")
     for path in files:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source / path, folder / path)

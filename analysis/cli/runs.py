@@ -515,7 +515,7 @@ def _print_fmu(path: Path) -> None:
 
 @click.command()
 @click.argument("numbers", nargs=-1)
-@common.out_option("out/figures", help="Folder.")
+@common.out_option("out/figures", help="Folder for plots and CSV.")
 @common.set_option("rod.length='45 in'; bare numbers are in SI. The verdicts then apply to the changed mechanism")
 @click.option("--list", "listing", is_flag=True, help="Only list the figures, with their titles and statements.")
 @common.report_errors

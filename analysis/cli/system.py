@@ -175,7 +175,9 @@ def run(
 @system.command()
 @_FILE
 @click.option("--stop", help="End of the runs, such as '0.2 s'.")
-@click.option("--decades", type=click.IntRange(1, 4), default=2, help="Decades of communication steps.")
+@click.option(
+    "--decades", type=click.IntRange(1, 4), default=2, help="Decades over which the communication step is varied."
+)
 @common.out_option(help="Folder for the plot.")
 @common.plot_option
 @common.report_errors

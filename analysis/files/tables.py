@@ -52,7 +52,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
             file.write(header + "\n")
             _write_rows(file, path, list(arrays.values()))
     except KeyboardInterrupt:
-        raise Interrupted(f"interrupted: {path} is not written") from None
+        raise Interrupted(f"interrupted: {path} was not written") from None
     return path
 
 

@@ -236,7 +236,7 @@ class Builder:
         """
         for body, place in places.items():
             if body != GROUND and body not in self.tables["bodies"]:
-                raise unknown_name(body, (GROUND, *self.tables["bodies"]), f"body {body}, of the pin {name}")
+                raise unknown_name(body, (GROUND, *self.tables["bodies"]), f"body {body}, named in the pin {name}")
             own = self.tables["bodies"].get(body)
             points = self.tables["ground"] if own is None else own.setdefault("points", {})
             points[name] = _as_data(place)

@@ -271,7 +271,7 @@ class _Zero:
         place = float(x[0]), y
         value = self.test(*place)
         if not isfinite(value):
-            raise InputError(f"the test function is {value} at ({place[0]:.9g}, {place[1]:.9g})")
+            raise InputError(f"the test function is {value} at ({place[0]:.9g}, {place[1]:.9g}): it must be finite")
         return np.array([value * self.box.size[0]])
 
     def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:

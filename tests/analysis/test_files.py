@@ -281,7 +281,7 @@ def test_a_large_csv_is_announced_and_ctrl_c_stops_it_within_a_second(tmp_path, 
 
     timer = threading.Timer(0.5, interrupt)
     timer.start()
-    with pytest.raises(Interrupted, match=r"interrupted: .*x\.csv is not written"):
+    with pytest.raises(Interrupted, match=r"interrupted: .*x\.csv was not written"):
         write_csv(tmp_path / "x.csv", {f"{k}": column for k in range(28)})
     assert time.perf_counter() - began[0] < 5.0
     assert not list(tmp_path.iterdir())

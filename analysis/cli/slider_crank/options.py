@@ -246,7 +246,7 @@ _MECHANISM_OPTIONS = (
         "--groove",
         type=click.Choice(["shaft", "apart"]),
         help="S1 = groove.amplitude sin(groove.ratio theta1), produced by a groove in the crank's shaft, as in the FMU, or by "
-        "something apart from the crank, as in the thesis.",
+        "a device apart from the crank, as in the thesis.",
     ),
     click.option(
         "--set",

@@ -379,7 +379,7 @@ def limits_by_kind(
             found.append(_slider_crank_limits(task, normal, bounds, constraints))
         else:
             if not gears:
-                raise InputError("no ratio of gears: geared five-bars need at least one")
+                raise InputError("no gear ratio is given: geared five-bars need at least one")
             found += _five_bar_limits(task, normal, bounds, constraints, gears)
     return found
 
