@@ -640,7 +640,7 @@ def test_pins_and_drives_of_the_builder(tmp_path):
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
     with pytest.raises(LinkworkError, match="the drive ram has"):
         built.drive("ram")
-    with pytest.raises(LinkworkError, match="body wheel, of the pin A"):
+    with pytest.raises(LinkworkError, match="body wheel, named in the pin A"):
         built.pin("A", wheel=(0, 0))
 
 

@@ -563,7 +563,7 @@ def straight_parts(
     """
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):
-        raise InputError(f"the part has {count} of the {len(points)} points: it must have from 2 to {len(points)}")
+        raise InputError(f"a part of {count} points of {len(points)}: it must have from 2 to {len(points)} points")
     starts = len(points) if closed else len(points) - count + 1
     # a part may cross the seam of a closed curve: append the curve's beginning
     laid = np.vstack([points, points[: count - 1]]) if closed else points
