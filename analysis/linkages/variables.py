@@ -106,10 +106,9 @@ class Variables:
         yield "tolerance_parameter()"
 
     def position_parameters(self) -> list[str]:
-        """Return the parameters that determine the poses of the bodies at the start."""
-        names = [
-            p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and p.role in ("", "ratio")
-        ]
+        """Return the parameters that determine the poses of the bodies and the twists of the springs at the start."""
+        kinds = ("m", "rad", "1", ""), ("", "ratio", "spring")
+        names = [p.name for p in self.interface.parameters if p.unit in kinds[0] and p.role in kinds[1]]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:

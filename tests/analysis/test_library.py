@@ -31,6 +31,7 @@ from linkwork.errors import InputError
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
+from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers, Solution
 
 from .conftest import opened
@@ -55,6 +56,21 @@ def run(name: str, **changes: Any) -> Trajectory:
 
 def test_the_library_is_there():
     assert len(FILES) >= 21
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_positions_at_the_start_change_only_with_the_position_parameters(path):
+    made = load_linkage(path)
+    start = {v.name: v.start for v in made.variables}
+
+    def positions(**changes: float) -> dict[str, float]:
+        values = zip(made.output_names, Plant.from_values(made, start | changes).outputs(), strict=True)
+        return {name: value for name, value in values if levels[name] == "position"}
+
+    levels = {v.name: v.level for v in made.variables}
+    for v in made.variables:
+        if v.causality == "parameter" and v.kind == "Real" and v.name not in made.position_parameters:
+            assert positions(**{v.name: 1.01 * v.start or 0.01}) == positions(), v.name
 
 
 def places(made: Mechanism, oracle: Multipliers, x: Iterable[float], p: Any = None) -> np.ndarray:
