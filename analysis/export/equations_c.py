@@ -350,6 +350,7 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
+            f"#define NO_ACCELERATION {_text(limits.NO_ACCELERATION)}",
             *_unjoined_messages(mechanism),
             "#endif",
             "",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.limits import ASSEMBLY
+from linkwork.limits import ASSEMBLY, MASSLESS
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, find_mechanism
@@ -258,13 +258,12 @@ class Run:
         return trajectory
 
     def describe_undefined_forces(self, x: NDArray[np.float64]) -> str:
-        """Return a text that names the springs whose law has no value just beyond the state x; empty if there are none.
+        """Return a text that names the springs whose law has no value just beyond the state x, or says that a mass is missing.
 
-        The laws are evaluated at the positions 1 us and 1 ms after the state, extrapolated with constant rates.
+        It is empty if neither is the case. The laws are evaluated at the positions 1 us and 1 ms after the state, extrapolated
+        with constant rates.
         """
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
-        if not springs:
-            return ""
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
         names, idle = self.mechanism.output_names, np.zeros((2, len(self.mechanism.channels)))
@@ -275,7 +274,11 @@ class Run:
         finite = dict(zip(names, map(np.all, np.isfinite(values).T)))
         lost = [spring for name, spring in springs.items() if not finite[name]]
         words = "law of {} has" if len(lost) == 1 else "laws of {} have"
-        return f": the {words.format(' and '.join(lost))} no value beyond" if lost else ""
+        if lost:
+            return f": the {words.format(' and '.join(lost))} no value beyond"
+        rates = [freedom.rate for freedom in self.mechanism.freedoms]
+        moves = all(finite[v.name] for v in self.mechanism.variables if v.rate_of in rates)
+        return "" if moves else f": {MASSLESS}"
 
     def _balance(self) -> tuple[int, int]:
         """Return the indices of the outputs for the energy balance residual and the kinetic energy."""

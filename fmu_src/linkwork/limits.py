@@ -17,6 +17,9 @@ NEAR_LIMIT = 0.05
 #: Reasons why a motion ends, as messages name them.
 ASSEMBLY = "limit of assembly"
 JAMMING = "friction so strong that it may jam the links"
+#: What is wrong where accelerations or outputs are not finite whatever the inputs.
+MASSLESS = "what a force moves has no mass or moment of inertia"
+NO_ACCELERATION = f"{MASSLESS}, a force law has no value, or a speed or parameter is too large"
 
 
 class UnjoinedMessages(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any
 
 from .errors import AssemblyError, InputError, IntegrationError, LinkworkError, ParameterError, StateError, StepError
 from .integrate import UNDEFINED, Vector, integrate
-from .limits import NEAR_LIMIT
+from .limits import NEAR_LIMIT, NO_ACCELERATION
 from .mechanism import Mechanism, Mode
 from .parameters import field_name, fmi_name
 
@@ -229,18 +229,28 @@ class Plant:
         Raises
         ------
         InputError
-            If an input is not finite, or so large that an output is not finite.
+            If an input is not finite, or so large that an output is not finite, or if one is not finite whatever the inputs.
         """
         self._check_inputs()
         i = self._applied_inputs()
         x = self._jump_rates(self.state, i, self._commanded)
-        result = self.mechanism.equations.outputs(x, i, self.start_energy, self._p)
-        if not all(map(isfinite, result)):
+        result = self._compute_outputs(x, i)
+        if result is None:
+            at, idle = f"an output is not finite at t = {self.time:.9g} s", (0.0,) * len(self.inputs)
+            still = self.mechanism.equations.apply_inputs(self._modes, idle, self._p)
+            if self._compute_outputs(self.state, still) is None:
+                raise InputError(f"{at}, {self.mechanism.describe_state(self.state)}: {NO_ACCELERATION}")
             largest = max(self.inputs, key=lambda name: abs(self.inputs[name]))
-            raise InputError(
-                f"an output is not finite at t = {self.time:.9g} s: input {largest} is {self.inputs[largest]:g}, too large"
-            )
+            raise InputError(f"{at}: input {largest} is {self.inputs[largest]:g}, too large")
         return result
+
+    def _compute_outputs(self, x: Vector, applied: Any) -> Any:
+        """Return the outputs at a state, or None if one of them is not finite."""
+        try:
+            result = self.mechanism.equations.outputs(x, applied, self.start_energy, self._p)
+        except UNDEFINED:
+            return None
+        return result if all(map(isfinite, result)) else None
 
     # Steps
 

@@ -187,7 +187,8 @@ fmi2Status fmi2CancelStep(fmi2Component component) {
 
 GET_STATUS(Status, fmi2Status, kind == fmi2DoStepStatus, c->s.step == GOOD ? fmi2OK : fmi2Discard)
 GET_STATUS(RealStatus, fmi2Real, kind == fmi2LastSuccessfulTime, c->s.plant.time)
-GET_STATUS(BooleanStatus, fmi2Boolean, kind == fmi2Terminated, c->s.step == LIMIT_OF_ASSEMBLY)
+/* true after every refused step: a master that does not look at its reason would repeat the step for ever */
+GET_STATUS(BooleanStatus, fmi2Boolean, kind == fmi2Terminated, c->s.step != GOOD)
 GET_STATUS(StringStatus, fmi2String, kind == fmi2DoStepStatus || kind == fmi2PendingStatus, c->s.message)
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value) {

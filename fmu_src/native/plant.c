@@ -505,8 +505,17 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
     if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
         Digits time, number;
+        const double idle[ROOM(INPUTS)] = {0};
+        char where[SENTENCE];
         reason = plant_check_assembly(a, x, sentence);
         if (reason != GOOD) return reason;
+        call(equations_outputs, (const double *[]){a->x, a->modes, idle, a->p}, (double *[]){y});
+        if (!all_finite(y, OUTPUTS)) {
+            configuration(a->x, where);
+            snprintf(sentence, SENTENCE, "an output is not finite at t = %s s, %.250s: " NO_ACCELERATION, digits(time, a->time),
+                     where);
+            return INPUT_NOT_FINITE;
+        }
         for (int i = 1; i < INPUTS; i++)
             if (fabs(u[i]) > fabs(u[largest])) largest = i;
         snprintf(sentence, SENTENCE, "an output is not finite at t = %s s: input %s is %s, too large", digits(time, a->time),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import replace
@@ -27,8 +28,8 @@ from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, rea
 from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
 from analysis.synthesis.linkage.machine import description, drives
-from linkwork.errors import InputError
-from linkwork.limits import LIMIT_SINE
+from linkwork.errors import InputError, LinkworkError
+from linkwork.limits import LIMIT_SINE, MASSLESS
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from linkwork.plant import Plant
@@ -253,6 +254,19 @@ def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
     # so do the runs of an ensemble
     many = simulate_many([made.first_set.parameters] * 2, **given)
     assert [message.partition(":")[2] for message in many.messages] == [" the law of pad has no value beyond"] * 2
+
+
+@pytest.mark.fmu
+def test_a_force_on_what_has_no_mass_is_named(tmp_path):
+    disc = linkage("massless", ground={"A": (0, 0)}).body(
+        "disc", points={"A": (0, 0), "Q": (1, 0)}, mass=1.0, cog=(0, 0)
+    )
+    made = disc.freedom("disc", "A", speed=10.0).mechanism()
+    given = made.first_set.parameters, Inputs(torque=1.0)
+    assert simulate(*given, stop_time=0.1).message.endswith(f": {MASSLESS}")
+    for file in (build(made, tmp_path), build_native(made, NATIVE, tmp_path)):
+        with pytest.raises(LinkworkError, match=re.escape(f", disc angle 0 rad (0.0000 deg): {MASSLESS}")):
+            cosimulate(file, *given, stop_time=0.1)
 
 
 @pytest.mark.slow

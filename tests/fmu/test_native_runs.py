@@ -23,7 +23,7 @@ from linkwork.errors import AssemblyError
 from linkwork.five_bar import MECHANISM as FIVE_BAR
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
-from linkwork.limits import JAMMING, LIMIT_SINE
+from linkwork.limits import JAMMING, LIMIT_SINE, NO_ACCELERATION
 from linkwork.plant import Plant
 
 from .native import DISCARD, ERROR, OK, WARNING, Instance, Library
@@ -96,6 +96,10 @@ def model(library: Library) -> str:
             "the links cannot be joined at crank angle 0 rad (0.0000 deg) and slider position 0 m",
         ),
         ({"initial__slider_velocity": 1e200}, "the energy at the start is not finite: crank angle 0 rad"),
+        (
+            {"initial__slider_velocity": 5e153},
+            f"an output is not finite at t = 0 s, crank angle 0 rad (0.0000 deg) and slider position 0 m: {NO_ACCELERATION}",
+        ),
         ({"drive__speed": math.nan}, "input drive.speed is nan at t = 0 s: it must be a finite number"),
         (
             {"slider__force": 1e300, "drive__mode": 0, "drive__torque": 1e308},
@@ -214,6 +218,9 @@ def test_an_input_that_is_not_finite(library: Library) -> None:
     assert c.status() == 2
     assert c.step(0.0, 1e-3) == DISCARD
     assert c.text() == "input drive.torque is inf at t = 0 s: it must be a finite number"
+    if library.fmi == 2:  # FMPy would otherwise repeat the step for ever
+        flag = c_int()
+        assert (c("GetBooleanStatus", 3, byref(flag)), flag.value) == (OK, 1)
     # the first cause stays
     assert c.step(1e-3, 1e-3) == DISCARD
     assert c.status() == 2
