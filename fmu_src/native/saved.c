@@ -22,7 +22,7 @@ Status instance_save(Instance *c, void **state) {
 
 Status instance_restore(Instance *c, const void *state) {
     const Saved *saved = state;
-    if ((int)saved->phase & (c->interface == CO_SIMULATION ? EVENT | CONTINUOUS : STEP))
+    if (saved->plant.follows != c->s.plant.follows)
         return instance_say(c, ERROR, "the saved state is not one of %s",
                             c->interface == CO_SIMULATION ? "co-simulation" : "model exchange");
     c->s = *saved;

@@ -345,9 +345,11 @@ def test_states_of_another_kind_are_refused(natives: dict[str, Path], tmp_path: 
         for of, text in texts.items():
             instance = library.instance().start()
             assert restored(instance, text) == (OK if of == name else ERROR)
-    # and of the other interface, whose modes an instance does not have
+    # and of the other interface, also before the initialisation
     for name, library in libraries.items():
         exchange = library.instance("me").start()
         assert restored(exchange, texts[name]) == ERROR
         assert restored(library.instance().start(), serialized(exchange, exchange.saved())) == ERROR
+        begun = library.instance()
+        assert restored(library.instance("me"), serialized(begun, begun.saved())) == ERROR
         assert exchange("EnterContinuousTimeMode") == OK
