@@ -69,6 +69,7 @@ def build_all(
         for name in names:
             if name not in there:
                 raise unknown_name(name, there, f"{what} {name!r}")
+    models, kinds, platforms = ([*dict.fromkeys(names)] for names in (models, kinds, platforms))
     chosen = [KINDS[name] for name in kinds or KINDS]
     here = this_platform() if any(kind is not PYTHON for kind in chosen) else ""
     every = [*PLATFORMS, *(name for name in platforms if name == WASM)]

@@ -129,7 +129,7 @@ def build_native(
         If the parts of the mechanism do not fit together.
     """
     check(mechanism)
-    platforms = [this_platform()] if platforms is None else list(platforms)
+    platforms = [this_platform()] if platforms is None else [*dict.fromkeys(platforms)]
     for name in platforms:
         if name not in EVERYWHERE:
             raise unknown_name(name, EVERYWHERE, f"platform {name!r}")

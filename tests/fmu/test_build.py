@@ -15,7 +15,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 import build_fmu
-from analysis.export import PLATFORMS, BuildError, build, compile_library, native_fmu
+from analysis.export import PLATFORMS, BuildError, build, build_all, compile_library, native_fmu
 from build_fmu import FMUS
 
 from .conftest import changed_sources, model_description
@@ -271,3 +271,9 @@ def test_processes_that_compile_at_the_same_time_wait_for_each_other(tmp_path: P
     assert [process.returncode for process in processes] == [0, 0, 0], said
     assert sum("Zig compiles what it needs" in text for text in said) == 1
     assert not any("all are compiled again" in text for text in said)
+
+
+def test_what_is_named_twice_is_built_once(tmp_path: Path) -> None:
+    """Two compilations into the same file at a time spoil it."""
+    built = list(build_all(["FiveBarSlider"] * 2, tmp_path, ["native"] * 2, ["x86_64-linux"] * 2))
+    assert [made.platforms for made in built] == [("x86_64-linux",)]
