@@ -10,8 +10,7 @@ import pytest
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import best_spring, inverse_dynamics
-from analysis.studies.youssef import chapter_7 as series_1
-from analysis.studies.youssef import control
+from analysis.studies.youssef import chapter_7, control, series_1
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.studies.youssef.series_2 import (
     PATH,
@@ -207,7 +206,7 @@ class TestSeries1:
         near_by = series_1.variational().u[:, None] + np.array([-1e-6, 0.0, 1e-6])
         assert np.abs(u - 1.0 - near_by[:, [1]]).min(axis=1).max() < 1e-9
         errors = np.array(
-            [np.abs(series_1.coupler_point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)]
+            [np.abs(chapter_7.coupler_point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)]
         )
         assert np.abs(errors[2] - errors[0]).max() / 2e-6 < 1e-5
 
@@ -223,33 +222,33 @@ class TestSeries1:
         assert change[:, 2] / change[:, 1] == pytest.approx(2.0, rel=1e-2)
 
     def test_isochronous_curves_are_circles_about_the_crank_pin(self) -> None:
-        for phi in np.radians(series_1.ISOCHRONES).tolist():
-            arc = series_1.coupler_point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))
+        for phi in np.radians(chapter_7.ISOCHRONES).tolist():
+            arc = chapter_7.coupler_point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))
             assert np.abs(arc - 0.5 * np.exp(1j * phi)) == pytest.approx(0.5, abs=1e-12)
 
     def test_area_that_is_reached(self) -> None:
         """Against random configurations, and a sum over small squares by the kinematics of the point."""
-        area = accessible_area(series_1.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
+        area = accessible_area(chapter_7.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
         random = np.random.default_rng(72)
-        z = series_1.coupler_point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
+        z = chapter_7.coupler_point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
         rings = np.concatenate([*area.outer, *area.holes]) @ np.array([1.0, 1j])
         inside = area.contains(z.real, z.imag)
         assert max((np.abs(rings - p).min() for p in z[~inside]), default=0.0) < 2e-3
         h = 4e-3
         phi, u = np.meshgrid(np.linspace(0.0, 2.0 * pi, 4001), np.linspace(-0.4, 0.4, 801))
-        z = series_1.coupler_point(phi.ravel(), u.ravel())
+        z = chapter_7.coupler_point(phi.ravel(), u.ravel())
         squares = np.unique(np.floor(np.column_stack([z.real, z.imag]) / h), axis=0)
         # squares on the edge count whole
         assert h * h * len(squares) == pytest.approx(area.area, rel=0.04)
 
-    @pytest.mark.parametrize("limits", series_1.LIMITS)
+    @pytest.mark.parametrize("limits", chapter_7.LIMITS)
     def test_enclosed_area_is_what_is_reached_and_the_hole(self, limits: tuple[float, float]) -> None:
-        area = series_1.reached_area(*limits)
+        area = chapter_7.reached_area(*limits)
         holes = 0.0
         for ring in area.holes:
             w = ring @ np.array([1.0, 1j])
             holes += abs(0.5 * (w.conj() * np.roll(w, -1)).imag.sum())
-        assert series_1.enclosed_area(*limits) == pytest.approx(area.area + holes, rel=2e-3)
+        assert chapter_7.enclosed_area(*limits) == pytest.approx(area.area + holes, rel=2e-3)
 
     def test_no_motion_is_nearer_than_the_variational_one(self) -> None:
         least = series_1.variational().error
