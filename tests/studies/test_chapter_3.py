@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.periodic import natural_frequency
 from analysis.run import Inputs, simulate
-from analysis.studies.youssef import chapter_3, formulation, free_crank, runs
+from analysis.studies.youssef import chapter_3, formulation, free_crank, no_spring, runs
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
@@ -24,33 +24,33 @@ class TestDrift:
     """Fig 3.2 and 3.3."""
 
     @staticmethod
-    def per_turn(drift: chapter_3.Drift) -> NDArray[np.float64]:
-        return np.diff(drift.slider_cm[: 3 * chapter_3.SAMPLES_PER_DRIFT_TURN + 1 : chapter_3.SAMPLES_PER_DRIFT_TURN])
+    def per_turn(drift: no_spring.Drift) -> NDArray[np.float64]:
+        return np.diff(drift.slider_cm[: 3 * no_spring.SAMPLES_PER_DRIFT_TURN + 1 : no_spring.SAMPLES_PER_DRIFT_TURN])
 
     @pytest.mark.parametrize("gravity", published.U_AFTER_40_TURNS_CM)
     def test_how_far_the_strongest_damper_lets_it_go(self, gravity: float) -> None:
-        last = chapter_3.drift(1e6, gravity).slider_cm[40 * chapter_3.SAMPLES_PER_DRIFT_TURN]
+        last = no_spring.drift(1e6, gravity).slider_cm[40 * no_spring.SAMPLES_PER_DRIFT_TURN]
         assert last == pytest.approx(published.U_AFTER_40_TURNS_CM[gravity], abs=0.005)
 
     def test_it_is_near_linear_with_the_strong_dampers_only(self) -> None:
-        for mu in chapter_3.DAMPINGS:
-            drifts = self.per_turn(chapter_3.drift(mu))
+        for mu in no_spring.DAMPINGS:
+            drifts = self.per_turn(no_spring.drift(mu))
             assert (abs(drifts[2] / drifts[0] - 1.0) < 0.1) == (mu >= 5e5)
 
     def test_the_motion_is_steady_from_the_start_or_never(self) -> None:
-        steady = {mu: chapter_3.drift(mu).transient for mu in chapter_3.DAMPINGS}
+        steady = {mu: no_spring.drift(mu).transient for mu in no_spring.DAMPINGS}
         assert {mu for mu, turns in steady.items() if turns == 0} == {5e5, 1e6}
         for mu in (1e4, 5e4, 1e5):
-            assert steady[mu] == chapter_3.drift(mu).collinear_turn
+            assert steady[mu] == no_spring.drift(mu).collinear_turn
 
     @pytest.mark.parametrize("mu", published.TURNS_TO_SINE_0_3)
     def test_coupler_and_rocker_come_collinear(self, mu: float) -> None:
         turns = published.TURNS_TO_SINE_0_3[mu]
-        assert chapter_3.drift(mu).collinear_turn == pytest.approx(turns, abs=0.5 if turns > 10 else 0.05)
+        assert no_spring.drift(mu).collinear_turn == pytest.approx(turns, abs=0.5 if turns > 10 else 0.05)
 
     @pytest.mark.parametrize("mu", [5e5, 1e6])
     def test_without_gravity_it_grows_by_a_quarter(self, mu: float) -> None:
-        without, drift = (chapter_3.drift(mu, gravity) for gravity in (0.0, 9.81))
+        without, drift = (no_spring.drift(mu, gravity) for gravity in (0.0, 9.81))
         assert self.per_turn(without) / self.per_turn(drift) == pytest.approx([1.25] * 3, abs=0.03)
         assert without.rate / drift.rate == pytest.approx(1.242, abs=0.003)
 
@@ -79,8 +79,8 @@ class TestSteadyMotion:
     @pytest.mark.parametrize("k", runs.STIFFNESSES)
     def test_the_mean_torque_pays_the_damper_alone(self, k: float) -> None:
         turn, parameters = runs.steady_turn(runs.table_3_1(k), 420.0), runs.table_3_1(k)
-        rate = np.gradient(turn.slider_cm / 100.0, chapter_3.PERIOD / 1440)
-        loss = parameters.slider_damping * (rate[:-1] ** 2).mean() * chapter_3.PERIOD / (2.0 * np.pi)
+        rate = np.gradient(turn.slider_cm / 100.0, runs.PERIOD / 1440)
+        loss = parameters.slider_damping * (rate[:-1] ** 2).mean() * runs.PERIOD / (2.0 * np.pi)
         means = chapter_3.damper_torque(k).mean(), turn.torque[:-1].mean()
         assert means == pytest.approx((loss, loss), abs=1e-5 * np.abs(turn.torque).max())
 
@@ -93,7 +93,7 @@ class TestSteadyMotion:
             coupler = p.crank_length * np.sin(crank) + p.coupler_cog_distance * np.sin(q[1])
             return p.gravity * (p.coupler_mass * coupler + p.rocker_mass * p.rocker_cog_distance * np.sin(q[2]))
 
-        rate = np.gradient(turn.slider_cm / 100.0, chapter_3.PERIOD / 1440)
+        rate = np.gradient(turn.slider_cm / 100.0, runs.PERIOD / 1440)
         for i in range(20, 1440, 140):
             crank, u = np.radians(turn.angle_deg[i]), turn.slider_cm[i] / 100.0
             weight = (potential(crank + 1e-5, u) - potential(crank - 1e-5, u)) / 2e-5

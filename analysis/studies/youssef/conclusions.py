@@ -17,24 +17,17 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SEEN_FALL, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
-from .chapter_3 import (
-    COLLINEAR_SINE,
-    DAMPINGS,
-    FEWEST_TURNS,
-    TRANSIENT_TURNS,
-    drift,
-    graph_distance,
-    run_from_rest,
-)
+from .chapter_3 import graph_distance, run_from_rest
 from .chapter_6 import TABLE, ratios_to_least, share_of_stated
 from .conclusions_linear import judge_introduction, judge_linearised
 from .formulation import judge_closure, judge_multipliers
 from .free_crank import Turns
 from .launches import TORQUES, launch, run_acceleration, run_peak
+from .no_spring import COLLINEAR_SINE, DAMPINGS, FEWEST_TURNS, TRANSIENT_TURNS, drift
 from .problems import AREA_N, PROBLEMS
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
-from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
+from .runs import PERIOD, SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 from .series_2 import best_error_ratios, error_ratios, out_of_reach, shares_of_stated
 
 NUMBER = "conclusions"
@@ -74,18 +67,18 @@ def collinear_turn(damping: float) -> float:
 
     The mechanism is Table 3.1 at 420 rpm with a damper (dyn.s/cm).
     """
-    angle, period = asin(COLLINEAR_SINE), 60.0 / SPEED
+    angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping),
         Inputs(speed=SPEED * RAD_S_PER_RPM),
-        stop_time=MOST_TURNS * period,
-        step=period,
+        stop_time=MOST_TURNS * PERIOD,
+        step=PERIOD,
         events=tuple(
             Event(name=str(sign), output="transmission.angle", level=level, direction=sign)
             for level, sign in ((angle, -1), (pi - angle, 1))
         ),
     )
-    return run.events[0].time / period if run.events else np.nan
+    return run.events[0].time / PERIOD if run.events else np.nan
 
 
 def ellipse_error(semi_axis: float) -> float:

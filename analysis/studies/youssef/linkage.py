@@ -17,7 +17,7 @@ from ...figures import Figure, animate_linkage, draw_linkage
 from ...run import Inputs, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import Study, StudyResult
-from .runs import SPEED, table_3_1
+from .runs import PERIOD, SPEED, table_3_1
 
 NUMBER = "linkage"
 #: Table 3.1 with P 12 cm from the crank pin and 30 degrees off the coupler.
@@ -30,8 +30,7 @@ STILL = 2.0 * np.pi * (TURNS - 1) + 1.0
 @cache
 def run() -> Trajectory:
     """Run three turns from the thesis's start."""
-    period = 60.0 / SPEED
-    return simulate(MECHANISM, Inputs(speed=SPEED * RAD_S_PER_RPM), stop_time=TURNS * period, step=period / 240)
+    return simulate(MECHANISM, Inputs(speed=SPEED * RAD_S_PER_RPM), stop_time=TURNS * PERIOD, step=PERIOD / 240)
 
 
 def compute() -> StudyResult:

@@ -24,6 +24,10 @@ from ..variation import cache, vary
 
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0
+#: Time of a turn (s).
+PERIOD = 60.0 / SPEED
+#: Column of the crank rotation from the start.
+TURNS = "turns of the crank [1]"
 #: Springs of Fig 3.4 to 3.14 (dyn/cm).
 STIFFNESSES = (5e5, 1e6, 2e6)
 #: Tolerances in the words of statements.
