@@ -39,16 +39,7 @@ from rich.table import Table
 
 from analysis.numerics.tracing import rebind_functions
 from analysis.studies.youssef.problems import PROBLEMS, WEIGHT, N, ellipse
-from analysis.synthesis import (
-    LargestLink,
-    Linkage,
-    RockerFunction,
-    Search,
-    TimedPath,
-    normal_form,
-    synthesize,
-    turn,
-)
+from analysis.synthesis import LargestLink, Linkage, RockerFunction, Search, TimedPath, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path, coupler_path_jacobian
 from analysis.synthesis.search.polish import Polisher, fit_least_squares, sum_of_squares
 from analysis.synthesis.search.scan import scan

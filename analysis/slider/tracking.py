@@ -25,17 +25,7 @@ from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
-from ..linear import (
-    Design,
-    LoopResult,
-    SampledController,
-    check_limit,
-    check_period,
-    control_loop,
-    peak,
-    rms,
-    saturate,
-)
+from ..linear import Design, LoopResult, SampledController, check_limit, check_period, control_loop, peak, rms, saturate
 from ..numerics.fourier import FourierSeries
 from ..run import Function, Inputs
 from ..units import Amount, in_si

@@ -23,15 +23,7 @@ from numba import float64, int64, njit
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from analysis.numerics import codegen
 from analysis.numerics.cache import _warn_shared, code_folder
-from analysis.numerics.codegen import (
-    VECTOR,
-    Kernel,
-    MachineCode,
-    evaluate,
-    fingerprint,
-    inner,
-    kernel,
-)
+from analysis.numerics.codegen import VECTOR, Kernel, MachineCode, evaluate, fingerprint, inner, kernel
 from analysis.numerics.symbolic import ELEMENTARY
 from analysis.numerics.vectors import weighted_rows
 from analysis.run import compiled, machine, simulate, sources

@@ -16,15 +16,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
-from tests.published_rahman import (
-    DEAD_CENTRES_DEG,
-    INCH,
-    OFFSETS_IN,
-    POUND_FORCE,
-    SHIFTS_IN,
-    TORQUE_LB_IN,
-    TWISTS_DEG,
-)
+from tests.published_rahman import DEAD_CENTRES_DEG, INCH, OFFSETS_IN, POUND_FORCE, SHIFTS_IN, TORQUE_LB_IN, TWISTS_DEG
 from tests.slider_cranks import Case, cases, seeded
 
 several = settings(max_examples=40, derandomize=True, deadline=None)

@@ -13,16 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle, StepPatch
 
 from analysis.figures import plot
-from analysis.slider_crank import (
-    SHIFT,
-    ConstantShift,
-    Estimate,
-    MonteCarlo,
-    Spread,
-    Tolerance,
-    force_turn,
-    monte_carlo,
-)
+from analysis.slider_crank import SHIFT, ConstantShift, Estimate, MonteCarlo, Spread, Tolerance, force_turn, monte_carlo
 from analysis.units import INCH
 from linkwork.errors import InputError
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters

@@ -38,11 +38,7 @@ from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 
-from ..published_rahman import (
-    DEAD_CENTRES_DEG,
-    GREATEST_SHIFTS_IN,
-    INCH,
-)
+from ..published_rahman import DEAD_CENTRES_DEG, GREATEST_SHIFTS_IN, INCH
 from ..slider_cranks import Case, cases, seeded
 
 OFFSET = parameters(10.0)

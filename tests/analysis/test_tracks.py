@@ -18,15 +18,7 @@ from analysis.periodic.motion import kernels
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from analysis.periodic.motion.kernels import SECTION, Status
-from analysis.periodic.motion.tracks import (
-    DONE,
-    IDLE,
-    RUNNING,
-    advance_tracks,
-    begin,
-    make_tracks,
-    set_mechanism,
-)
+from analysis.periodic.motion.tracks import DONE, IDLE, RUNNING, advance_tracks, begin, make_tracks, set_mechanism
 from analysis.run.compiled import read_lane
 from linkwork.five_bar.published import SETS
 

@@ -15,14 +15,7 @@ from linkwork.slider_crank import dynamics as D
 from linkwork.slider_crank import kinematics as K
 from linkwork.slider_crank import published
 from linkwork.slider_crank.vectors import scale
-from tests.oracles.bodies import (
-    crank_particles,
-    guide_frame,
-    pins,
-    slider_crank,
-    slider_motion,
-    solve_bodies,
-)
+from tests.oracles.bodies import crank_particles, guide_frame, pins, slider_crank, slider_motion, solve_bodies
 from tests.plant.test_dynamics import SLIDER_CRANK
 from tests.published_rahman import INCH, POUND_FORCE, POUND_INCH, SPOTS, TORQUE_LB_IN, Spot
 from tests.slider_cranks import DRIVES, Case, cases, seeded

@@ -18,19 +18,10 @@ from analysis.numerics.dual import Dual
 from analysis.slider_crank import JointLoads, close, follow, joint_loads
 from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
-from analysis.studies.rahman import closure, forces, method, rates
+from analysis.studies.rahman import closure, forces, iteration, method, rates
 from analysis.studies.rahman import figures as rahman
 from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, close_loop_combined, joint_rates, turn
-from analysis.studies.rahman.table import (
-    COMPONENTS,
-    CONSTANT,
-    FAMILIES,
-    FIGURES,
-    IDEAL,
-    QUANTITIES,
-    Case,
-    Component,
-)
+from analysis.studies.rahman.table import COMPONENTS, CONSTANT, FAMILIES, FIGURES, IDEAL, QUANTITIES, Case, Component
 from analysis.studies.statements import Case as Judged
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 
@@ -462,7 +453,7 @@ class TestMethod:
     def test_planar_estimates_miss_the_tilt_of_the_rod_most(self, case: Case) -> None:
         """eta2 of the closed loop at theta1 = 0 is the angle of the rod to the plane of the crank."""
         along = -slider(case, np.zeros(1))[0] * cos(np.radians(case.twist_deg)) - case.shift_in
-        assert closure._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
+        assert iteration._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
 
     def test_the_roundoff_counts_in_components_that_one_path_alone_has(self) -> None:
         """51a has roundoff in the component i of the slider's momentum, which 53a prints as 0."""

@@ -7,9 +7,9 @@ import numpy as np
 from ..statements import Statement, at_least, near, text
 from ..study import Study, StudyResult
 from ..variation import ignore_changes
-from .closure import endings
 from .figures import ALL, FROM_DEAD, NOTHING, ROUNDING, FloatArray, clear_mask, nothing, values
 from .forces import PLANAR, planar_forces
+from .iteration import endings
 from .method import OUT, PLANE
 from .table import COMPONENTS
 

@@ -17,18 +17,7 @@ from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, text
 from ..study import Study, StudyResult, pad_columns
 from ..variation import ignore_changes
-from .figures import (
-    ANGLE,
-    ANGLES_DEG,
-    CRANK,
-    FROM_DEAD,
-    NOTHING,
-    ROUNDING,
-    TORQUE,
-    clear_mask,
-    nothing,
-    values,
-)
+from .figures import ANGLE, ANGLES_DEG, CRANK, FROM_DEAD, NOTHING, ROUNDING, TORQUE, clear_mask, nothing, values
 from .method import (
     AT,
     AT_RATES,

@@ -15,16 +15,7 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from ..variation import ignore_changes
 from . import method, printed
-from .figures import (
-    ANGLE,
-    ANGLES_DEG,
-    NOTHING,
-    OFFSETS,
-    ROUNDING,
-    dead_centres_deg,
-    full_name,
-    nothing,
-)
+from .figures import ANGLE, ANGLES_DEG, NOTHING, OFFSETS, ROUNDING, dead_centres_deg, full_name, nothing
 from .table import IDEAL, SPIKES_DEG, Case
 
 

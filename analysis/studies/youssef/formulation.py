@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from math import exp, factorial, log2
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +25,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, result_curves
+from .integrators import CLASSICAL, SLIP, order_of_series, runge_kutta, spurious_root, stable_steps
 from .runs import SPEED, table_3_1
 
 #: The mechanism, its speed (rad/s), the duration of the motion (s), and the steps (s); appendix 1 begins with 1e-3 s.
@@ -232,40 +232,6 @@ def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.
     return estimates, errors, (back - exactly)[:, 0]
 
 
-class RungeKutta(NamedTuple):
-    """Run of the classical method of fourth order: the state after each step, and the number of function evaluations."""
-
-    states: NDArray[Any]
-    evaluations: int
-
-
-#: Stages of the classical method: place in the step, and weight in sixths. `SLIP` has a slip: its last stage is at mid-step.
-CLASSICAL = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
-SLIP = (*CLASSICAL[:3], (0.5, 1.0))
-
-
-def runge_kutta(
-    f: Callable[[float, NDArray[Any]], NDArray[Any]],
-    y: ArrayLike,
-    h: float,
-    n: int,
-    stages: tuple[tuple[float, float], ...] = CLASSICAL,
-) -> RungeKutta:
-    """Integrate y' = f(t, y) from t = 0 by n steps of length h of the classical Runge-Kutta method.
-
-    ``stages`` gives for each stage its place in the step and its weight in sixths.
-    """
-    states, evaluations = [np.asarray(y)], 0
-    for i in range(n):
-        y0 = states[-1]
-        slope = total = np.zeros_like(y0)
-        for at, weight in stages:
-            slope = f((i + at) * h, y0 + at * h * slope)
-            total, evaluations = total + weight * slope, evaluations + 1
-        states.append(y0 + h / 6.0 * total)
-    return RungeKutta(np.array(states), evaluations)
-
-
 @cache
 def integrate_by_runge_kutta(
     step: float, first: bool = False, stages: tuple[tuple[float, float], ...] = CLASSICAL
@@ -304,44 +270,6 @@ def slip_ratio(step: float) -> float:
     return float(closure_error(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
 
 
-def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
-    """Return the greatest stable steps for y' = ``rate`` y (of y'' = -y where it is 1j) by Runge-Kutta's and Hamming's method.
-
-    A step is stable if the solution does not grow at the end of ``steps`` steps.
-    """
-
-    def classical(h: float) -> NDArray[np.complex128]:
-        return runge_kutta(lambda t, y: rate * y, np.ones(1, complex), h, steps).states[:, 0]
-
-    def hamming(h: float) -> NDArray[np.complex128]:
-        options = {"method": Hamming, "first_step": h, "max_step": h, "rtol": 1e9, "atol": 1e99}
-        y: NDArray[np.complex128]
-        y = solve_ivp(lambda t, y: rate * y, (0.0, steps * h), np.ones(1, complex), **options).y[0]
-        return y
-
-    found = []
-    for method in (classical, hamming):
-        low, high = 0.1, 4.0
-        while high - low > 1e-3:
-            middle = 0.5 * (low + high)
-            before, last = np.abs(method(middle)[-100:]).reshape(2, 50).max(axis=1)
-            low, high = (middle, high) if last < before else (low, middle)
-        found.append(low)
-    return found[0], found[1]
-
-
-def order_of_series(highest: int) -> float:
-    """Return the order of the Taylor series method on y' = -y, from the errors with h = 0.1 and 0.05.
-
-    The series has the derivatives of y' up to the order ``highest``.
-    """
-    errors = []
-    for n in (10, 20):
-        growth = sum((-1.0 / n) ** k / factorial(k) for k in range(highest + 2))
-        errors.append(abs(growth**n - exp(-1.0)))
-    return log2(errors[0] / errors[1])
-
-
 def closure_error(q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the closure error (cm), eq (2.1), for each column of q, shape (4, n)."""
     lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
@@ -366,15 +294,6 @@ def evaluations_a_step() -> float:
         counts.append((found.nfev, len(found.t)))
     (fewer, short), (more, long) = counts
     return float((more - fewer) / (long - short))
-
-
-def spurious_root(past: ArrayLike, rates: ArrayLike, h: float) -> float:
-    """Return the greatest modulus of a corrector's spurious roots on y' = -y with a step h.
-
-    The spurious roots are all but the one near exp(-h). ``past`` and ``rates`` are the corrector's coefficients of y and of y'.
-    """
-    roots = np.roots(np.asarray(past) + h * np.asarray(rates))
-    return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())
 
 
 def judge_multipliers() -> tuple[Case, ...]:

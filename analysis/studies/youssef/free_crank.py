@@ -23,14 +23,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
 from ..variation import cache
-from .runs import (
-    ALIKE_WORDS,
-    SIGN,
-    SPEED,
-    greatest_ratio,
-    plain,
-    table_3_1,
-)
+from .runs import ALIKE_WORDS, SIGN, SPEED, greatest_ratio, plain, table_3_1
 
 #: Springs of the free motion (dyn/cm).
 SOFT, STIFF = 5e5, 2e6

@@ -17,23 +17,8 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_most, text
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import (
-    FOUND,
-    PRINTED,
-    TARGET,
-    FloatArray,
-    best,
-    curves_panel,
-    linkages_panel,
-    path_columns,
-    shape_curve,
-)
-from .problems import (
-    PACKAGING_OFFSET_CM,
-    PACKAGING_ROTATION,
-    PROBLEMS,
-    N,
-)
+from .chapter_6 import FOUND, PRINTED, TARGET, FloatArray, best, curves_panel, linkages_panel, path_columns, shape_curve
+from .problems import PACKAGING_OFFSET_CM, PACKAGING_ROTATION, PROBLEMS, N
 
 NUMBER = "6.11"
 #: Travel AB between the program's points (10, 0) and (164, 0) (cm).
