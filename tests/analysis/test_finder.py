@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
+from analysis.linkages import linkage
 from analysis.periodic import Drive, OrbitError, Stability, confirm, newton_orbit, sweep
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
@@ -49,6 +50,23 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     assert starts[:, 0].min() < 0.7 * low[0]
     assert starts[:, 0].max() > 0.7 * high[0] > 2.0 * -low[0]
     assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
+
+
+@pytest.mark.parametrize("length", [0.1, 2.0])
+def test_motions_much_smaller_than_the_bodies_are_found(length: float) -> None:
+    """An unbalanced rotor on a sprung carriage, Duffing's equation: amplitudes by harmonic balance, for bodies of any length."""
+    mass, damping, stiffness, cubic, unbalance, speed = 1.05, 1.0, 900.0, 2.5e6, 0.05 * 0.01, 36.0
+    built = linkage(f"duffing-{length:.0f}", ground={"A": (0, 0)})
+    built.body("carriage", points={"P": (0, 0), "C": (0, 0), "Q": (length, 0)}, mass=1.0)
+    built.slide("guide", body="carriage", on="ground", through="A", direction=0)
+    built.body("rotor", points={"C": (0, 0), "R": (length, 0)}, mass=0.05, cog=(0.01, 0), inertia=1e-4)
+    built.spring("spring", at="guide", stiffness=stiffness, damping=damping, law="2.5e6*x**3")
+    built.freedom("carriage", "guide").freedom("rotor", "C", speed=speed)
+    rest, bend = stiffness - mass * speed**2, 0.75 * cubic
+    force = unbalance * speed**2
+    squares = np.roots([bend**2, 2.0 * rest * bend, rest**2 + (damping * speed) ** 2, -(force**2)])
+    found = find_orbits(built.mechanism().name, speed=speed)
+    assert [orbit.amplitude for orbit in found.orbits] == pytest.approx(sorted(np.sqrt(squares.real)), rel=0.01)
 
 
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])

@@ -83,7 +83,7 @@ def test_every_coordinate_has_its_resonance(response: Response) -> None:
         assert top.coordinate == number
         assert top.parameter == pytest.approx(peak(*oscillator), rel=1e-8)
         assert top.amplitude == pytest.approx(size(peak(*oscillator), *oscillator), rel=1e-8)
-    assert [(a.risk, a.of) for a in response.speeds_to_avoid] == [
+    assert [(a.risk, a.coordinate) for a in response.speeds_to_avoid] == [
         (Risk.RESONANCE, "upright position"), (Risk.RESONANCE, "across position"),
     ]  # fmt: skip
     for avoided, oscillator in zip(response.speeds_to_avoid, (UPRIGHT, ACROSS)):

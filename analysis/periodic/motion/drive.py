@@ -29,7 +29,7 @@ from ...run import (
     takes_published,
 )
 from ...units import Amount, in_si
-from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
+from .flow import PLAIN, Crank, Flow, find_crank, find_turning_freedom, flow
 
 #: Size below which two quantities are rounding errors: relative change of accelerations by a turn, error of a ratio of turns.
 _NO_SPRING = 1e-7
@@ -582,6 +582,10 @@ SAME = 1e-6
 _WIDEST, _WIDER = 16.0, 1.25
 #: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor above.
 _ONE_SIDED = 1.3
+#: Greatest free vibrations per turn of the crank at the widest starts, unless those of small amplitudes are half as fast.
+_FASTEST = 30.0
+#: Ratio of the largest ellipse of starts to the smallest, for motions much smaller than the room that the links have.
+_DEPTH = 1024.0
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
 
@@ -644,6 +648,35 @@ def assembly_ranges(
     return sides[0], sides[1]
 
 
+def _slow_distances(
+    parameters: Parameters, drive: Drive, guess: NDArray[np.float64], distances: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Reduce distances of the free coordinates from rest to those at which free vibrations are not too fast: see `_FASTEST`.
+
+    Under a spring that becomes much stiffer there are no periodic motions far away, and integrations from there take very long.
+    """
+    mechanism = find_mechanism(parameters)
+    flow, vector, constants = drive.flow(mechanism), drive.vector(mechanism), np.array(parameters.constants())
+    rates = flow.function(PLAIN, mechanism.is_switched_on(parameters.constants()))
+    numbers = (flow.modes, np.append(vector, np.zeros_like(vector)), np.append(constants, np.zeros_like(constants)))
+    pace, n, half = drive.speed or guess[-1], flow.size, flow.size // 2
+
+    def square(place: int, away: float) -> float:
+        # square of the number of free vibrations per turn of the crank, from the change of the acceleration
+        y = np.zeros((2, n * (n + 2)))
+        y[:, :n] = guess
+        y[:, place] = flow.rest[place] + np.array([0.0, away])
+        slopes = [float(rates(0.0, z, *numbers)[half + place]) for z in y]
+        return float(abs((slopes[1] - slopes[0]) / (away * pace)))
+
+    found = distances.copy()
+    for i, away in enumerate(distances.tolist()):
+        most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
+        while square(i, found[i]) > most and abs(found[i]) > 1e-3 * abs(away):
+            found[i] /= _WIDER
+    return found
+
+
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that makes full turns."""
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
@@ -653,11 +686,12 @@ def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
 def spread_starts(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
-    """Return starts with many amplitudes and phases, by a scrambled Sobol sequence; shape (count or 2 count, n).
+    """Return starts with many amplitudes and phases, by a scrambled Sobol sequence; shape (3/2 count or 5/2 count, n).
 
     In the plane of a coordinate and its rate the starts fill the largest ellipse about the default initial value for which the
-    links can be joined. If a coordinate can move much further in one direction than in the other, ``count`` further starts fill
-    the ellipse about the middle of the range of this coordinate.
+    links can be joined. Half as many further starts have amplitudes that are spread evenly over the logarithm, because the
+    motions may be much smaller than the room that the links have. If a coordinate can move much further in one direction than
+    in the other, ``count`` further starts fill the ellipse about the middle of the range of this coordinate.
 
     Parameters
     ----------
@@ -672,18 +706,25 @@ def spread_starts(
 
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
-    low, high = assembly_ranges(parameters, drive, guess)
-    sequence = qmc.Sobol(flow.size, rng=number).random(count)
-    amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
+    rest = flow.rest[:half]
+    low, high = (
+        rest + _slow_distances(parameters, drive, guess, side - rest)
+        for side in assembly_ranges(parameters, drive, guess)
+    )
     around = mean_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
-    rest = flow.rest[:half]
-    ellipses = [(rest, np.minimum(rest - low, high - rest))]
-    if (np.maximum(rest - low, high - rest) > _ONE_SIDED * ellipses[0][1]).any():
-        ellipses.append((0.5 * (low + high), 0.5 * (high - low)))
+    own = np.minimum(rest - low, high - rest)
+    filled, further = (
+        qmc.Sobol(flow.size, rng=seed).random(n) for seed, n in ((number, count), ([number, 1], count // 2))
+    )
+    further[:, :half] = _DEPTH ** -further[:, :half]
+    ellipses = [(rest, own, filled), (rest, own, further)]
+    if (np.maximum(rest - low, high - rest) > _ONE_SIDED * own).any():
+        ellipses.append((0.5 * (low + high), 0.5 * (high - low), filled))
     sets = []
-    for centre, extent in ellipses:
-        found = np.tile(guess, (count, 1))
+    for centre, extent, sequence in ellipses:
+        amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
+        found = np.tile(guess, (len(sequence), 1))
         found[:, :half] = centre + extent * amplitude * np.cos(phase)
         found[:, half : 2 * half] = around + extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
         if flow.torque:
