@@ -10,7 +10,7 @@ import pytest
 
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
 from analysis.linkages import linkage
-from analysis.periodic import Drive, OrbitError, Stability, confirm, newton_orbit, sweep
+from analysis.periodic import Drive, OrbitError, Stability, basins, confirm, newton_orbit, sweep
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
@@ -52,21 +52,31 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
 
 
-@pytest.mark.parametrize("length", [0.1, 2.0])
-def test_motions_much_smaller_than_the_bodies_are_found(length: float) -> None:
-    """An unbalanced rotor on a sprung carriage, Duffing's equation: amplitudes by harmonic balance, for bodies of any length."""
-    mass, damping, stiffness, cubic, unbalance, speed = 1.05, 1.0, 900.0, 2.5e6, 0.05 * 0.01, 36.0
+def duffing(length: float) -> str:
+    """Describe an unbalanced rotor on a sprung carriage, Duffing's equation, with bodies of any length; return its name."""
     built = linkage(f"duffing-{length:.0f}", ground={"A": (0, 0)})
     built.body("carriage", points={"P": (0, 0), "C": (0, 0), "Q": (length, 0)}, mass=1.0)
     built.slide("guide", body="carriage", on="ground", through="A", direction=0)
     built.body("rotor", points={"C": (0, 0), "R": (length, 0)}, mass=0.05, cog=(0.01, 0), inertia=1e-4)
-    built.spring("spring", at="guide", stiffness=stiffness, damping=damping, law="2.5e6*x**3")
-    built.freedom("carriage", "guide").freedom("rotor", "C", speed=speed)
-    rest, bend = stiffness - mass * speed**2, 0.75 * cubic
-    force = unbalance * speed**2
-    squares = np.roots([bend**2, 2.0 * rest * bend, rest**2 + (damping * speed) ** 2, -(force**2)])
-    found = find_orbits(built.mechanism().name, speed=speed)
+    built.spring("spring", at="guide", stiffness=900.0, damping=1.0, law="2.5e6*x**3")
+    return built.freedom("carriage", "guide").freedom("rotor", "C", speed=36.0).mechanism().name
+
+
+@pytest.mark.parametrize("length", [0.1, 2.0])
+def test_motions_much_smaller_than_the_bodies_are_found(length: float) -> None:
+    """Amplitudes by harmonic balance."""
+    speed = 36.0
+    rest, bend, damping, force = 900.0 - 1.05 * speed**2, 0.75 * 2.5e6, 1.0 * speed, 0.05 * 0.01 * speed**2
+    squares = np.roots([bend**2, 2.0 * rest * bend, rest**2 + damping**2, -(force**2)])
+    found = find_orbits(duffing(length), speed=speed)
     assert [orbit.amplitude for orbit in found.orbits] == pytest.approx(sorted(np.sqrt(squares.real)), rel=0.01)
+
+
+def test_basins_do_not_depend_on_the_length_of_the_bodies() -> None:
+    plane = {"position": (-0.025, 0.025), "rate": (-0.9, 0.9)}
+    short, long = (basins(duffing(length), Drive(speed=36.0), points=6, **plane) for length in (0.1, 2.0))
+    assert short.ends.tolist() == long.ends.tolist()
+    assert set(short.ends.ravel()) == {0, 1}
 
 
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,9 @@ STARTS = 16
 _TOGETHER = 4
 #: Samples of a turn from which an amplitude is computed.
 SAMPLES = 64
-#: For basins: bound of the integrator's local error, distance from a motion, relative to the scale, below which a start has
-#: settled on it, and turns at most.
-_TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
+#: For basins: greatest distance from a motion at which a start has settled on it, relative to the scale and to the distance of
+#: the nearest other motion; bound of the integrator's local error relative to this distance; turns at most.
+_NEAR, _APART, _TOLERANCE, _TURNS = 1e-2, 0.2, 1e-4, 3000
 #: Default plane of basins: its width relative to the range of the motions, and the range relative to the scale below which a
 #: coordinate counts as at rest.
 _WIDTH, _REST = 1.5, 1e-9
@@ -361,15 +362,28 @@ def basins(
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
     row = point_row([point], known[0])
+    near = min(_NEAR, _APART * _least_distance(found.orbits, row.scales[0]))
     ends, computed = RowComputation(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
-        partial(_ends, point, known, place, across),
+        partial(_ends, point, known, near, place, across),
         up.tolist(),
-        [row_name(row, known, (*_FOLLOWED, GAP), code, place, *across, value) for value in up.tolist()],
+        [row_name(row, known, (*_FOLLOWED, GAP), code, near, place, *across, value) for value in up.tolist()],
         (points,),
     )
     met = ends.astype(np.int64)
     met[met >= 0] = owner[met[met >= 0]]
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed, place=place)
+
+
+def _least_distance(orbits: Sequence[PeriodicOrbit], scale: FloatArray) -> float:
+    """Return the least distance of two motions at crank angle 0, relative to the scale; infinity for a single motion."""
+    passed = [orbit.passages() for orbit in orbits]
+    return min(
+        (
+            float(np.abs(orbits[0].flow.remove_turns(a[:, None] - b) / scale).max(axis=2).min())
+            for a, b in combinations(passed, 2)
+        ),
+        default=np.inf,
+    )
 
 
 def find_coordinate(flow: Flow, name: str | None) -> int:
@@ -434,12 +448,13 @@ def describe_turns(flow: Flow, turns: int) -> str:
 
 
 def _ends(
-    point: OperatingPoint, known: FloatArray, place: int, across: FloatArray, rates: Sequence[float]
+    point: OperatingPoint, known: FloatArray, near: float, place: int, across: FloatArray, rates: Sequence[float]
 ) -> FloatArray:
-    """Return for each start of a row an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
+    """Return for each start an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
     A start is the first known motion with other values of one coordinate and its rate: the coordinate with the index ``place``
-    in y is one value of ``across``, shape (points,); the rate is ``rate`` at all starts of the row.
+    in y is one value of ``across``, shape (points,); the rate is one of ``rates``, the same in a row. ``near`` is the distance,
+    relative to the scale, at which a start has settled.
     """
     starts = np.tile(known[0], (len(rates) * len(across), 1))
     starts[:, place], starts[:, point.flow.size // 2 + place] = (
@@ -447,6 +462,6 @@ def _ends(
         np.repeat(rates, len(across)),
     )
     ends = np.zeros(len(starts), dtype=np.int64)
-    section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE)
-    kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
+    section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE * near)
+    kernels.settle_starts(section, point.flow.period, near, _TURNS, starts, known, ends)
     return ends.reshape(len(rates), -1).astype(float)
