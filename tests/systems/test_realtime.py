@@ -172,7 +172,9 @@ def test_a_refused_step_ends_the_program_with_a_sentence(tmp_path: Path) -> None
     host = build_host(replace(system, parts=parts).wiring(), tmp_path)
     done = subprocess.run([host, "1000"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "DoStep failed" in done.stderr
+    reason, end = done.stderr.splitlines()
+    assert reason.startswith("motor: in the step from t = ")
+    assert end.endswith("DoStep failed")
 
 
 def test_what_cannot_be_one_program_is_refused(tmp_path: Path) -> None:
