@@ -19,7 +19,6 @@ from analysis.synthesis.search.polish import fit_least_squares, polish, residual
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.scan import scan
 from analysis.synthesis.search.start import Start, make_linkage, make_start
-from analysis.synthesis.search.statement import BETWEEN
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.errors import InputError, ParameterError
@@ -386,7 +385,7 @@ def violations(program: Program, start: Start, *, first: bool = False) -> dict[s
     _, g = program.evaluate(*program.unknowns_and_parameters(start, **held))
     over = np.maximum(program.g_low - g, g - program.g_high)
     names = [label.name for label in program.labels]
-    return {name: max(v for v, own in zip(over, names) if own == name) for name in names}
+    return {name: max(v for v, own in zip(over, names) if own == name) for name in dict.fromkeys(names)}
 
 
 def excess(linkage: syn.Linkage, unknown: Any, name: str, *, first: bool = False) -> float:
@@ -456,19 +455,23 @@ class TestBetween:
             over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
 
-    def test_transmission_angle_over_a_turn_with_a_moved_pivot(self) -> None:
-        linkage = syn.Linkage(
-            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
-            pivot=syn.SliderMotion(FourierSeries(np.array([0.0, 0.02]), np.zeros(2)), 0.3),
-        )  # fmt: skip
-        normal, unknown = syn.normal_form(TASK), syn.SliderUnknown(harmonics=1)
-        # what is held at 96 places is held with 2.5e-3 rad to spare
-        for spare in (1e-3, 4e-3):
-            limits = make_limits(TASK, normal, None, (syn.LeastTransmission(angle=linkage.least_transmission - spare),))
-            over = violations(Program(normal, limits, unknown), make_start(linkage, normal, unknown))[
-                "transmission angle"
-            ]
-            assert (over > 0.0) == (spare < BETWEEN)
+    @pytest.mark.parametrize("judged", [False, True])
+    def test_transmission_angle_over_a_turn_with_a_moved_pivot(self, judged: bool) -> None:
+        """With gears -3 the angle is extreme between the rotations of the grid; a search has half a degree to spare."""
+        unknown = syn.CrankUnknown(ratio=-3, length=(0.01, 0.5))
+        normal, spare = syn.normal_form(TASK), math.radians(0.01 if judged else 0.5)
+        for phase in (0.0, 1.0, 3.0):
+            linkage = syn.FiveBar(
+                ground_length=0.6, crank_length=0.2, coupler_length=0.65, rocker_length=0.5, crank_phase=phase,
+                pivot=syn.SecondCrank(0.2, -3, 0.3),
+            )  # fmt: skip
+            cosine = linkage.cosine_at_c(linkage.reach(np.linspace(0.0, 2.0 * math.pi, 100001)))
+            least = math.acos(np.abs(cosine).max())
+            for off in (1e-4, -spare):
+                limits = make_limits(TASK, normal, None, (syn.LeastTransmission(angle=least + off),))
+                program = Program(normal, limits, unknown, judged=judged)
+                over = violations(program, make_start(linkage, normal, unknown))["transmission angle"]
+                assert (over > 0.0) == (off > 0.0)
 
 
 class TestUntimed:

@@ -227,8 +227,14 @@ class TestQuickSwing:
             syn.synthesize(syn.QuickSwing(swing="100 deg", time_ratio=1.5))
         with pytest.raises(syn.InfeasibleError, match="no crank-rocker with a swing of -60 deg"):
             syn.synthesize(task, {"crank_length": (0.02, 0.02), "rocker_length": ("1 cm", "2 cm")})
+        shape = syn.synthesize(task, constraints=[]).best.linkage
+        for bounds in ({"crank_length": ("20 cm", "30 cm")}, {"rocker_length": (None, "5 mm")}):
+            sized = syn.synthesize(task, bounds, constraints=[]).best.linkage  # type: ignore[arg-type]
+            assert sized.least_transmission == pytest.approx(shape.least_transmission, abs=1e-6)
         with pytest.raises(ParameterError, match="be one of ground_length"):
             syn.synthesize(task, {"pivot_x": (0.0, 0.0)})
+        with pytest.raises(ParameterError, match=r"bounds of crank_length is 0\.05: it must be two numbers"):
+            syn.synthesize(task, {"crank_length": 0.05})  # type: ignore[dict-item]
         with pytest.raises(InputError, match="cannot keep TimeRatio: leave it out, or ask for a RockerFunction"):
             syn.synthesize(task, constraints=[syn.TimeRatio(least=1.1)])
         with pytest.raises(InputError, match="has no weights"):
@@ -269,6 +275,22 @@ class TestSearch:
         assert linkage.point_is_pin
         np.testing.assert_allclose(linkage.path(syn.turn(24)), np.column_stack([x, np.zeros(24)]), atol=1e-8)
         np.testing.assert_allclose([*linkage.vector[2:5]], [0.04, 0.05, 0.16], rtol=1e-4)
+
+    @pytest.mark.parametrize(
+        ("bounds", "height", "rms"),
+        [
+            ({"pivot_y": ("-60 mm", "-30 mm")}, -0.03, 3.3294e-3),
+            ({"pivot_y": (0.02, 0.02)}, 0.02, 1.6006e-3),
+            ({"ground_length": (0, 0)}, 0.0, 2.7618e-3),
+        ],
+    )
+    def test_the_shaft_stays_in_its_bounds_beside_the_guide(self, bounds: Any, height: float, rms: float) -> None:
+        """The errors are those of the best linkages by SciPy's differential evolution."""
+        at = np.radians(np.linspace(0.0, 300.0, 13))
+        task = syn.SliderFunction(position=0.05 * np.cos(at - 0.4) + 0.006 * np.sin(2.0 * at), rotation=at)
+        best = syn.synthesize(task, bounds, search=QUICK).best
+        assert best.linkage.pivot_y == pytest.approx(height, abs=1e-7)
+        assert best.evaluation.rms == pytest.approx(rms, rel=1e-4)
 
     def test_stroke_and_time_ratio_are_kept(self) -> None:
         phi = syn.turn(36)
@@ -324,6 +346,8 @@ class TestSearch:
             {"kinds": ("slider-crank",), "constraints": [syn.PivotRegion(pivot="D", polygon=[[0, 0], [1, 0], [0, 1]])]},
             "cannot keep a region of pivot D",
         ),
+        (None, {"kinds": ("slider-crank",), "bounds": {"ground_length": (-0.04, 0.01)}}, "offset of a slider-crank"),
+        (None, {"kinds": ("slider-crank",), "bounds": [0.1]}, "must be a mapping"),
         (None, {"kinds": ("six-bar",)}, "six-bar"),
         (None, {"kinds": "slider-crank"}, "must be a sequence"),
         (None, {"kinds": ("geared-five-bar",), "gears": (1.234,)}, "be a ratio of whole numbers"),

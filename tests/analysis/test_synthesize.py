@@ -605,6 +605,11 @@ class TestBadInput:
                 "the crank of a triple-rocker does not turn fully",
             ),
             (
+                {"constraints": [syn.Toggle(at=1.0)]},
+                syn.InfeasibleError,
+                "a crank that is to come to a toggle cannot turn fully, which the task asks for",
+            ),
+            (
                 {"bounds": {"ground_length": (1.0, 2.0), "coupler_length": (0.1, 0.3), "rocker_length": (0.1, 0.3)}},
                 syn.InfeasibleError,
                 "the crank cannot turn fully: ground link and crank are at least",

@@ -30,7 +30,7 @@ from ..linkage.linkage import LINKS, Linkage, SliderCrank
 from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
 from ..task.limit_position import dead_centres
-from ..task.limits import GROUND, LARGEST
+from ..task.limits import GROUND, LARGEST, check_bounds, complete_bounds
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
@@ -179,11 +179,7 @@ class _SwingShapes:
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
-        self.bounds: dict[str, tuple[float, float]] = {}
-        for name, (low, high) in dict(bounds or {}).items():
-            if name not in LINKS:
-                raise ParameterError(name, (low, high), f"bound one of {', '.join(LINKS)}: the other dimensions follow")
-            self.bounds[name] = low or 0.0, inf if high is None else high
+        self.bounds = _read_bounds(bounds, LINKS)
         self.cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
         chord = 2.0 * sin(0.5 * abs(float(task.swing)))
         most = chord / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
@@ -200,14 +196,13 @@ class _SwingShapes:
         if l2 <= 0.0 or sides[0] * sides[1] <= 0.0:
             return None
         found = dict(zip(LINKS, (hypot(x, y), l2, l3, 1.0)))
-        fixed = [ends[0] / found[name] for name, ends in self.bounds.items() if ends[0] == ends[1]]
-        scale = fixed[0] if fixed else min(GROUND / found["ground_length"], self.cap / max(found.values()))
-        made = tuple(scale * value for value in found.values())
-        kept = all(
-            low * (1.0 - 1e-9) <= value <= min(high, self.cap) * (1.0 + 1e-9)
-            for value, (low, high) in zip(made, (self.bounds.get(name, (0.0, inf)) for name in LINKS))
-        )
-        return made if kept else None  # type: ignore[return-value]
+        least = max(low / found[name] for name, (low, _) in self.bounds.items())
+        most = min(min(high, self.cap) / found[name] for name, (_, high) in self.bounds.items())
+        if least > most * (1.0 + 1e-9):
+            return None
+        # a ground link of 100 mm, or as near to it as the bounds allow
+        scale = min(max(GROUND / found["ground_length"], least), most)
+        return tuple(scale * value for value in found.values())  # type: ignore[return-value]
 
     def cosine(self, l3: float) -> float:
         """Return the cosine of the least transmission angle over a turn; 1 if no linkage exists or a bound is violated."""
@@ -236,16 +231,23 @@ class _SwingShapes:
         return min(begun, key=lambda one: Solution.from_linkage(self.task, one).error)
 
 
+def _read_bounds(bounds: Any, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the least and greatest length of each dimension in ``names`` (m): as given, or zero and infinity."""
+    given = check_bounds(bounds)
+    for name in given:
+        if name not in names:
+            raise ParameterError(name, given[name], f"bound one of {', '.join(names)}: the other dimensions follow")
+    free = 0.0, inf
+    both = {name: complete_bounds(name, given.get(name, free), free) for name in names}
+    return {name: (max(low, 0.0), high) for name, (low, high) in both.items()}
+
+
 def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
     """Return the least and greatest length of offset, crank and coupler, by name (m)."""
     cap = min(
         (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
     )
-    ends = dict.fromkeys(BOUNDED, (0.0, cap))
-    for name, (low, high) in dict(bounds or {}).items():
-        if name not in BOUNDED:
-            raise ParameterError(name, (low, high), f"be one of {', '.join(BOUNDED)}: the others follow")
-        ends[name] = max(low or 0.0, 0.0), min(cap, inf if high is None else high)
+    ends = {name: (low, min(cap, high)) for name, (low, high) in _read_bounds(bounds, BOUNDED).items()}
     # the coupler is at least half the stroke, as with a time ratio of 1 and no offset
     low, high = ends["coupler_length"]
     turned = task.advance

@@ -380,10 +380,10 @@ def _meets_task(solution: Solution) -> bool:
 
 def format_dimension(name: str, value: float) -> str:
     """Format a dimension with its unit."""
+    # + 0.0 removes the minus sign of a zero
     if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
-        # + 0.0 removes the minus sign of a zero
         return f"{round(degrees(value), 3) + 0.0:.3f} deg"
-    return f"{value * 1e3:.6g} mm"
+    return f"{value * 1e3 + 0.0:.6g} mm"
 
 
 def headline(solution: Solution) -> str:

@@ -423,7 +423,8 @@ class Polisher:
                 feasible=within and np.isfinite(quality),
             )
         objective: Objective = "squares" if self.normal.outline is None else "curve"
-        return self.program(objective, exact=True, judged=self.limits.way is not None).judge_start(start)
+        judged = self.limits.way is not None or self.pivot is not None
+        return self.program(objective, exact=True, judged=judged).judge_start(start)
 
 
 def worst_violation(

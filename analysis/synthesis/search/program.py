@@ -28,11 +28,13 @@ from .start import Answer, Start, clip_to_bounds, distances_from_bounds, pivot_s
 from .statement import FURTHER, GRID, SOUGHT, Statement
 
 FloatArray = NDArray[np.float64]
-#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution.
+#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution. The greatest error
+#: of a linkage with a fixed pivot is minimised with adaptive small steps: monotone ones stall at a degenerate optimum.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
     "least": {"mu_strategy": "adaptive"},
+    "worst, fixed": {"mu_strategy": "adaptive", "bound_push": 1e-8, "bound_frac": 1e-8},
     "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
 #: Limit of iterations of IPOPT: most optima are reached within a hundred, the others only after many.
@@ -113,6 +115,8 @@ class Program(Statement):
         """Return an IPOPT solver with a limit of iterations; ``near`` if the start is close to an optimum."""
         if (iterations, near) in self._solvers:
             return self._solvers[iterations, near]
+        fixed = self.objective == "worst" and self.pivot is None
+        manner = "worst" if near else "worst, fixed" if fixed else self.objective
         self._solvers[iterations, near] = symbolic.ipopt(
             "synthesis",
             self._nlp,
@@ -122,7 +126,7 @@ class Program(Statement):
             acceptable_tol=1e-7,
             acceptable_iter=8,
             bound_relax_factor=0.0,
-            **FOLLOWING["worst" if near else self.objective],
+            **FOLLOWING[manner],
         )
         return self._solvers[iterations, near]
 

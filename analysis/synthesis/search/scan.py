@@ -366,9 +366,15 @@ def _place_slider_functions(normal: Normal, limits: Limits, shapes: FloatArray, 
     # seen from the shaft, the slider's position increases to the left
     side = -np.sign(factor)
     quality = (x - wanted + (side * size)[:, None] * off) ** 2 @ w
+    # the guide is the x axis: bounds and regions may leave only one of its sides for the shaft
+    guide = -normal.origin.imag / normal.unit
+    rooms = [(limits.low[1], limits.high[1])]
+    rooms += [(np.min(t, axis=(0, 1))[1], np.max(t, axis=(0, 1))[1]) for pivot, t in limits.regions if pivot == "A"]
+    lowest, highest = max(low for low, _ in rooms), min(high for _, high in rooms)
+    quality[((side > 0.0) & (lowest > guide)) | ((side < 0.0) & (highest < guide))] = inf
     q = np.zeros((len(shapes), 11))
     q[:, 0] = wanted + side * size * mean
-    q[:, 1] = -normal.origin.imag / normal.unit - side * size * links[:, 0]
+    q[:, 1] = guide - side * size * links[:, 0]
     q[:, 2:6] = size[:, None] * links[:, :4]
     q[:, 6], q[:, 7], q[:, 8] = size * links[:, 2], 0.5 * pi * side, phase
     return Candidates(quality=quality, q=q, rotation=None, branch=branch)

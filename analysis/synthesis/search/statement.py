@@ -26,9 +26,8 @@ from .start import pivot_bounds
 
 FloatArray = NDArray[np.float64]
 Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
-#: Number of crank rotations at which assembly, speed and acceleration of a moving pivot are bounded, and the margin of the
-#: least transmission angle for the rotations between them (rad).
-GRID, BETWEEN = 96, 2.5e-3
+#: Number of crank rotations at which assembly, speed and acceleration of a moving pivot are bounded.
+GRID = 96
 #: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
 #: Number of parts into which a search divides the rotation between two stations, to bound the transmission angle at the ends of
@@ -93,7 +92,7 @@ class Statement:
     judged : bool
         Whether linkages are only judged. A search bounds the transmission angle at few rotations between two stations, with a
         margin that guarantees the bound between these rotations. A judgement bounds the angle at its extremes, without a
-        margin; if the pivot moves, it bounds the angle at many rotations.
+        margin; if the pivot moves, it bounds the angle at many rotations instead.
     """
 
     def __init__(
@@ -421,12 +420,17 @@ class Statement:
             self._bound_transmission(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
         elif limits.turn is not None:
             # closer rotations for gears whose cranks turn several times
-            d2 = self._squared_reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
-            self._bound_transmission(p, d2, d2, limits.turn + BETWEEN, tilt)
+            turned = max(map(abs, self._turns))
+            count = JUDGED * turned if self._judged else GRID * max(1, turned // 2)
+            self._bound_reach(p, v, casadi.DM(turn(count)), 2.0 * pi / count, limits.turn, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
             x, step = self._dense_rotations(phi)
+            least = limits.way or 0.0
+            if self.pivot is not None:
+                self._bound_reach(p, v, x, step, least, tilt)
+                return
             slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
-            if self._judged and self.pivot is None:
+            if self._judged:
                 # in each step also the rotation nearest to the crank along the ground link; none beyond the end
                 step[self.normal.n - 1] = 0.0
                 turned = casadi.sign(step) * (x + p.crank_phase) / pi
@@ -434,7 +438,24 @@ class Statement:
                 x, slack = casadi.vertcat(x, x + casadi.sign(step) * nearest), 0.0
             d2 = self._squared_reach(p, v, x)
             # an extreme between two of these rotations differs from the values there by no more than the slack
-            self._bound_transmission(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
+            self._bound_transmission(p, d2 - slack, d2 + slack, least, tilt)
+
+    def _bound_reach(self, p: Any, v: Any, x: Any, step: Any, least: float, tilt: Any) -> None:
+        """Bound the transmission angle of a linkage with a moving pivot at rotations x, which are ``step`` apart.
+
+        Unless linkages are only judged, the angle is bounded between these rotations, too: there the squared distance BD does
+        not pass an extreme beyond its tangents at the rotations, each half a step long to either side.
+        """
+        if self._judged:
+            d2 = self._squared_reach(p, v, x)
+            self._bound_transmission(p, d2, d2, least, tilt)
+            return
+        casadi = self._casadi
+        at = casadi.SX.sym("at", x.numel())
+        d2 = self._squared_reach(p, v, at)
+        ahead = 0.5 * step * casadi.jtimes(d2, at, casadi.DM.ones(x.numel()))
+        (ends,) = casadi.substitute([casadi.vertcat(d2 - ahead, d2 + ahead)], [at], [casadi.SX(x)])
+        self._bound_transmission(p, ends, ends, least, tilt)
 
     def _bound_transmission(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """Constrain |cos mu| to at most cos(least) and at most ``tilt``, if given, where mu is the transmission angle.

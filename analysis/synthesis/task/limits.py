@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, pi
 from typing import Any, get_args
 
 import numpy as np
@@ -143,26 +143,25 @@ def make_limits(
     Raises InputError or ParameterError if a bound or constraint is not usable; InfeasibleError if the ends of a bound are in
     the wrong order, or bounds and constraints contradict one another.
     """
-    if not isinstance(bounds, Mapping | None):
-        raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
+    bounds = check_bounds(bounds)
     if not isinstance(constraints, Sequence):
         raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
     # kinds of linkages without a second crank leave it out
-    bounds = {name: ends for name, ends in (bounds or {}).items() if name != SECOND_LENGTH}
+    bounds = {name: ends for name, ends in bounds.items() if name != SECOND_LENGTH}
     for name in bounds:
         if name not in UNKNOWNS:
             raise unknown_name(name, sorted(UNKNOWNS), f"dimension {name!r}, which is to have bounds")
     for c in constraints:
         if not isinstance(c, Constraint):
             raise InputError(f"{c!r} is not a constraint: use {', '.join(_constraint_names())}")
-    given = _dimension_ranges(task, normal, bounds, constraints)
+    given = _dimension_ranges(task, normal, bounds, constraints, linkage)
     _check_links(given, constraints, linkage)
     _check_reach(given, normal, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
     shift[:2] = normal.origin.real, normal.origin.imag
     scale[:7] = normal.unit
-    turn, way, grashof = _transmission_limits(constraints)
+    turn, way, grashof = _transmission_limits(constraints, normal.whole_turn)
     if way is not None and normal.whole_turn and grashof not in _SWINGING:
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
@@ -192,7 +191,11 @@ def make_limits(
 
 
 def _dimension_ranges(
-    task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
+    task: Task,
+    normal: Normal,
+    bounds: Mapping[str, tuple[float, float]],
+    constraints: Sequence[Constraint],
+    linkage: type[Linkage],
 ) -> dict[str, tuple[float, float]]:
     """Return the least and greatest value of every unknown (m, rad), as given or by default."""
     caps = [c.length for c in constraints if isinstance(c, LargestLink)]
@@ -211,17 +214,18 @@ def _dimension_ranges(
         if not caps and not set(LINKS) & set(bounds):
             usual["ground_length"] = GROUND, GROUND
     ends = {
-        name: _complete_bounds(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS
+        name: complete_bounds(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS
     }
     for name in (*LINKS, "point_distance"):
         low, high = ends[name]
-        if name in LINKS and high <= 0.0:
+        link = name in linkage.links
+        if link and high <= 0.0:
             raise ParameterError(f"bound of {name}", high, "be above zero (m): a link has a length")
         if caps and low > cap:
             raise InfeasibleError(
                 f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
             )
-        low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
+        low, high = max(low, 1e-6 * cap if link else 0.0), min(high, cap) if caps else high
         if low > high:
             raise InfeasibleError(f"{name} is to be at most {high:g} m: it is a distance and cannot be below {low:g} m")
         ends[name] = low, high
@@ -234,8 +238,13 @@ def _required_functions(constraint: Constraint, way: RotationRange) -> tuple[Req
     return (constraint,) if isinstance(constraint, Require) else ()
 
 
-def _transmission_limits(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
-    """Return the least transmission angles over a turn and during the task, and the Grashof type; see `Limits`."""
+def _transmission_limits(
+    constraints: Sequence[Constraint], whole_turn: bool
+) -> tuple[float | None, float | None, str | None]:
+    """Return the least transmission angles over a turn and during the task, and the Grashof type; see `Limits`.
+
+    ``whole_turn`` tells whether the task takes a whole turn of the crank.
+    """
     turn, way = (
         max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
         for over in ("turn", "task")
@@ -253,14 +262,22 @@ def _transmission_limits(constraints: Sequence[Constraint]) -> tuple[float | Non
             raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
         # even so, its links must stay joined during the task
         way = way or 0.0
-    if turn is not None and any(c.stops for c in demands):
+    if (turn is not None or whole_turn) and any(c.stops for c in demands):
         raise InfeasibleError(
-            "a crank that is to come to a toggle cannot turn fully, which another constraint asks for"
+            "a crank that is to come to a toggle cannot turn fully, which "
+            f"{'the task' if turn is None else 'another constraint'} asks for"
         )
     return turn, way, type_
 
 
-def _complete_bounds(
+def check_bounds(bounds: Mapping[str, tuple[float, float]] | None) -> Mapping[str, tuple[float, float]]:
+    """Return the bounds, an empty mapping for None; raise InputError if they are no mapping."""
+    if not isinstance(bounds, Mapping | None):
+        raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
+    return bounds or {}
+
+
+def complete_bounds(
     name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]
 ) -> tuple[float, float]:
     """Return the bounds of dimension ``name``: the given ``ends``, or the default for an end that is None or infinite."""
@@ -268,7 +285,7 @@ def _complete_bounds(
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
         raise ParameterError(f"bounds of {name}", ends, "be two numbers, the least and the greatest value") from None
-    if not np.isfinite([low, high]).all():
+    if np.isnan([low, high]).any():
         raise ParameterError(f"bounds of {name}", ends, "be numbers, or None for an open end")
     if low > high:
         unit = "rad" if name in ANGLES else "m"
@@ -360,7 +377,7 @@ def limits_by_kind(
     Raises InputError if a kind is unknown, cannot do the task, or does not support a constraint; ParameterError,
     InfeasibleError as `make_limits` does.
     """
-    kinds = usual_kinds(task) if kinds is None else kinds
+    kinds, bounds = usual_kinds(task) if kinds is None else kinds, check_bounds(bounds)
     if isinstance(kinds, str) or not kinds:
         raise InputError(
             f"kinds are {kinds!r}: they must be a sequence of one or several of {', '.join(get_args(Kind))}"
@@ -421,17 +438,27 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
             # the guide is the x axis, with the shaft on either side, and the coupler point is the slider
             Require(function=lambda d: np.cos(d.ground_angle), equal=True, name="direction of the guide"),
             Require(
+                function=lambda d: d.pivot_y + d.ground_length * np.sin(d.ground_angle),
+                equal=True,
+                name="place of the guide",
+                scale=normal.unit,
+            ),
+            Require(
                 function=lambda d: d.point_distance - d.coupler_length, equal=True, name="slider", scale=normal.unit
             ),
         )
-        bounds = {"point_angle": (0.0, 0.0)} | dict(bounds or {})
-    given = {"ground_length": (0.0, None)} | {n: ends for n, ends in dict(bounds or {}).items() if n != "rocker_length"}
+        bounds = {"point_angle": (0.0, 0.0)} | dict(bounds)
+    given = {"ground_length": (0.0, None)} | {n: ends for n, ends in bounds.items() if n != "rocker_length"}
     limits = make_limits(task, normal, given, own, linkage=SliderCrank)
+    least = given["ground_length"][0]
+    if least is not None and -inf < least < 0.0:
+        raise ParameterError(
+            "bound of ground_length",
+            least,
+            "be zero or above: the offset of a slider-crank is a distance, ground_angle gives the side of its guide",
+        )
     low, high = limits.low.copy(), limits.high.copy()
     low[UNKNOWNS.index("rocker_length")] = high[UNKNOWNS.index("rocker_length")] = 0.0
-    offset = UNKNOWNS.index("ground_length")
-    asked = given["ground_length"][0]
-    low[offset] = (asked or 0.0) / normal.unit
     return replace(limits, low=low, high=high)
 
 
