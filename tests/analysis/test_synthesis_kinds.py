@@ -231,7 +231,7 @@ class TestQuickSwing:
         for bounds in ({"crank_length": ("20 cm", "30 cm")}, {"rocker_length": (None, "5 mm")}):
             sized = syn.synthesize(task, bounds, constraints=[]).best.linkage  # type: ignore[arg-type]
             assert sized.least_transmission == pytest.approx(shape.least_transmission, abs=1e-6)
-        with pytest.raises(ParameterError, match="be one of ground_length"):
+        with pytest.raises(ParameterError, match="bound one of ground_length"):
             syn.synthesize(task, {"pivot_x": (0.0, 0.0)})
         with pytest.raises(ParameterError, match=r"bounds of crank_length is 0\.05: it must be two numbers"):
             syn.synthesize(task, {"crank_length": 0.05})  # type: ignore[dict-item]
