@@ -486,10 +486,9 @@ def plot_trade_off(traded: syn.TradeOff, *, title: str = "") -> Figure:
         f"{fill(syn.quality_name(task), 26)} [{unit}]": factor * traded.error.filled(np.nan),
         f"worst error [{length}]": scale * worst,
     }
-    shown, unit = syn.SHOWN[syn.OVER[traded.over].unit]
     over = syn.OVER[traded.over]
     label = f"limit of the {over.name}" if over.small else f"{over.name} asked for"
-    limit, limit_label = shown * traded.limit, f"{label} [{unit}]"
+    limit, limit_label = over.factor * traded.limit, f"{label} [{over.shown}]"
     order = np.argsort(limit)
     with style.figure_style():
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))

@@ -61,7 +61,6 @@ from .result.solution import format_variants as format_variants
 from .result.solution import judge as judge
 from .result.solution import rank_solutions as rank_solutions
 from .search.solve import OVER as OVER
-from .search.solve import SHOWN as SHOWN
 from .search.solve import Synthesis as Synthesis
 from .search.solve import SynthesisInterrupted as SynthesisInterrupted
 from .search.solve import TradeOff as TradeOff

@@ -10,10 +10,11 @@ import pytest
 
 from analysis.studies.statements import near
 from analysis.studies.youssef import search
-from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounding_range, straight_error
+from analysis.studies.youssef.chapter_6 import best, straight_error
 from analysis.studies.youssef.packaging import TRAVEL_CM, straightest
-from analysis.studies.youssef.problems import PROBLEMS
+from analysis.studies.youssef.problems import PROBLEMS, pairing_area
 from analysis.studies.youssef.quality import assembly_arguments, linkages, qualities
+from analysis.studies.youssef.stated_errors import half_units, rounding_range
 from analysis.synthesis import Linkage, evaluate, turn
 from tests import published
 

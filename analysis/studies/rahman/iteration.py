@@ -13,28 +13,9 @@ from ...slider_crank import Settled, close, greatest_shift, settle
 from ...slider_crank.closure import chain, equations, planar, residuals
 from ...units import INCH
 from ..statements import Statement, at_least, at_most, text
-from .figures import (
-    ALL,
-    CRANK,
-    NOTHING,
-    ROUNDING,
-    full_name,
-    nothing,
-)
-from .method import (
-    OPEN,
-    OUT,
-    PLANE,
-    ROD,
-    FloatArray,
-    case_turn,
-)
-from .printed import (
-    GRID_DEG,
-    MAX_STEPS,
-    STEP,
-    turn,
-)
+from .figures import ALL, CRANK, NOTHING, ROUNDING, full_name, nothing
+from .method import OPEN, OUT, PLANE, ROD, FloatArray, case_turn
+from .printed import GRID_DEG, MAX_STEPS, STEP, turn
 from .table import IDEAL, Case
 
 #: Planar mechanisms of section 3.1, and their names in the labels of cases.

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from decimal import Decimal
 from functools import cache, partial
-from itertools import product
-from math import pi, radians
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +26,6 @@ from ...synthesis import (
     Search,
     Solution,
     TimedPath,
-    UntimedPath,
     evaluate,
     normal_form,
     synthesize,
@@ -37,9 +34,10 @@ from ...synthesis import (
 )
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, WEIGHT, N, ellipse, rocker_function
+from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_function
+from .stated_errors import ROUNDED, judge_stated_error, printed_error, rounding_range
 
 FINDINGS = """\
 **Claims.** The downhill simplex, started from many random sets of lengths and angles, finds the four-bar with the least error
@@ -99,20 +97,6 @@ def best(name: str) -> Solution:
     return synthesize(p.task, p.bounds, p.constraints, search=SEARCH).best
 
 
-def printed_error(name: str) -> float:
-    """Return the error of the printed linkage with its misprint mended, in the unit of print."""
-    return PROBLEMS[name].linkage_error(PROBLEMS[name].linkage)
-
-
-def share_of_stated(name: str) -> float:
-    """Return the printed linkage's error divided by the stated error, for the reading that brings this ratio nearest to 1."""
-    p = PROBLEMS[name]
-    assert p.error is not None
-    return min(
-        (error / p.error for error in errors_by_reading(name, p.linkage).values()), key=lambda share: abs(share - 1.0)
-    )
-
-
 def our_error(name: str) -> float:
     """Return the error of our best linkage for a problem (unit of print)."""
     return PROBLEMS[name].convert(best(name).error)
@@ -122,10 +106,7 @@ def our_error(name: str) -> float:
 
 #: Tolerance of a printed error, in words.
 HALF = "half a unit of the last digit"
-#: How a printed linkage is rounded before its error is judged; our readings of the errors of the rocker functions.
-ROUNDED = (
-    "with each printed number of the linkage rounded up or down so that the result comes nearest to the stated one"
-)
+#: Our readings of the errors of the rocker functions.
 READING = (
     "(6.18) has no weights, and the number of crank angles is not printed. We try these readings: 18 to 360 angles in equal "
     "steps of whole or half degrees, with the end of the turn or without; the weighted errors added up and divided by 1000, "
@@ -133,75 +114,6 @@ READING = (
 )
 #: Reason why the stated error of a coupler curve does not belong to the printed linkage; see test_chapter_6.py.
 NO_DIGIT = "no rounding gives the stated value, nor does any other digit in a single place"
-#: Numbers of crank angles, in steps of whole or half degrees, that the errors of the rocker functions may refer to.
-NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
-
-
-def errors_by_reading(name: str, linkage: Linkage) -> dict[str, float]:
-    """Return the error of a linkage (unit of print) for each reading of the text.
-
-    Only the rocker functions have more than one reading.
-    """
-    if not isinstance(PROBLEMS[name].task, RockerFunction):
-        return {"": PROBLEMS[name].linkage_error(linkage)}
-    found: dict[str, float] = {}
-    for n in NUMBERS:
-        squares = DEG2_PER_RAD2 * evaluate(rocker_function(n), linkage).errors ** 2
-        turned, angles, end = 360.0 * np.arange(n) / n, f"; {n} crank angles", float(squares[0])
-        if name == "rocker":
-            found |= {angles: squares.sum(), f"{angles} and the end of the turn": squares.sum() + end}
-            continue
-        for ends, within in (
-            ("", (turned >= 60) & (turned <= 260)),
-            (" without its ends", (turned > 60) & (turned < 260)),
-        ):
-            window, rest = squares[within].sum(), squares[~within].sum()
-            found |= {
-                f"{angles}, window{ends}": window + rest / WEIGHT,
-                f"{angles} and the end of the turn, window{ends}": window + (rest + end) / WEIGHT,
-                f"{angles} a turn, those within the window{ends} alone": window,
-            }
-    return found
-
-
-def half_units(linkage: Linkage) -> FloatArray:
-    """Return half a unit of the last printed digit of each dimension of a linkage (m, rad), 0 if it is not printed."""
-    si = np.array([1.0 / CM_PER_METRE] * 7 + [radians(1.0)] * 3)
-    digits = (Decimal(repr(round(float(x), 6))) for x in linkage.vector / si)
-    return si * [0.5 * 10.0 ** int(x.as_tuple().exponent) if x else 0.0 for x in digits]
-
-
-def rounding_range(name: str) -> dict[str, tuple[float, float]]:
-    """Return the least and the greatest error that a printed linkage can have, for each reading (see `errors_by_reading`).
-
-    Each printed dimension may be off by up to half a unit of its last digit.
-    """
-    p = PROBLEMS[name]
-    off = half_units(p.linkage)
-    if isinstance(p.task, UntimedPath):
-        # the crank's phase does not change the curve
-        off[8] = 0.0
-    # the extremes of a nearly linear change are at the corners, or near the middle
-    corners = {tuple(off * signs) for signs in product((-1.0, 1.0), repeat=len(off))} | {(0.0,) * len(off)}
-    errors = [
-        errors_by_reading(name, Linkage.from_vector(p.linkage.vector + np.array(change), 1)) for change in corners
-    ]
-    return {reading: (min(e[reading] for e in errors), max(e[reading] for e in errors)) for reading in errors[0]}
-
-
-def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives the stated value") -> Case:
-    """Judge whether a stated error lies in one of the ranges of `rounding_range`; the range nearest to the error counts."""
-    ranges, wanted = rounding_range(name), float(stated)
-    nearest = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
-    reading = min(nearest, key=lambda r: abs(nearest[r] - wanted))
-    least, greatest = ranges[reading]
-    return near(
-        f"{label}{reading}; rounded up or down {least:.2f} to {greatest:.2f}",
-        stated,
-        nearest[reading],
-        unit=PROBLEMS[name].unit,
-        why=why,
-    )
 
 
 def _ellipse_a() -> tuple[Statement, ...]:
@@ -416,29 +328,6 @@ TABLE = {
 
 
 # Paths
-
-
-def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> float:
-    """Return the thesis's quality function of path generation, an area (section 6.4.1, listing at L9797).
-
-    The first desired point is paired with the nearest actual point. Each following desired point is paired with the nearest of
-    the actual points that follow the previous partner; their number is ``window`` times the actual points per desired point.
-    If there are as many actual points as desired ones, they are paired in order, because the program leaves no point without a
-    partner (L9894-9898). Two successive pairs span two triangles, whose areas are added up. The lesser result of the two
-    senses of rotation is returned.
-    """
-    span = int(window * len(actual) / len(desired))
-    areas = []
-    for way in (actual, actual[::-1]):
-        curve = np.roll(way, -int(np.argmin(np.hypot(*(way - desired[0]).T))), axis=0)
-        partner = list(range(len(curve))) if len(curve) == len(desired) else [0]
-        for point in desired[len(partner) :]:
-            ahead = curve[partner[-1] : partner[-1] + span + 1]
-            partner.append(partner[-1] + int(np.argmin(np.hypot(*(ahead - point).T))))
-        d, a = (np.vstack([points, points[:1]]) @ np.array([1.0, 1j]) for points in (desired, curve[partner]))
-        triangles = ((a[:-1] - d[:-1], a[1:] - d[:-1]), (d[1:] - d[:-1], a[1:] - d[:-1]))
-        areas.append(sum(0.5 * float(np.abs((p.conj() * q).imag).sum()) for p, q in triangles))
-    return min(areas)
 
 
 def path_columns(name: str) -> dict[str, FloatArray]:

@@ -18,7 +18,7 @@ from ..rules import ABOUT, ABOUT_DEG, ALIKE, SEEN_FALL, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
 from .chapter_3 import graph_distance, run_from_rest
-from .chapter_6 import TABLE, ratios_to_least, share_of_stated
+from .chapter_6 import TABLE, ratios_to_least
 from .conclusions_linear import judge_introduction, judge_linearised
 from .formulation import judge_closure, judge_multipliers
 from .free_crank import Turns
@@ -29,6 +29,7 @@ from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
 from .runs import PERIOD, SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 from .series_2 import best_error_ratios, error_ratios, out_of_reach, shares_of_stated
+from .stated_errors import share_of_stated
 
 NUMBER = "conclusions"
 #: Longer semi-axes of the ellipses that links move along (cm): those of paths (a) and (b), and one between.

@@ -282,3 +282,26 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
         ),
     }
 )
+
+
+def pairing_area(desired: NDArray[np.float64], actual: NDArray[np.float64], *, window: float) -> float:
+    """Return the thesis's quality function of path generation, an area (section 6.4.1, listing at L9797).
+
+    The first desired point is paired with the nearest actual point. Each following desired point is paired with the nearest of
+    the actual points that follow the previous partner; their number is ``window`` times the actual points per desired point.
+    If there are as many actual points as desired ones, they are paired in order, because the program leaves no point without a
+    partner (L9894-9898). Two successive pairs span two triangles, whose areas are added up. The lesser result of the two
+    senses of rotation is returned.
+    """
+    span = int(window * len(actual) / len(desired))
+    areas = []
+    for way in (actual, actual[::-1]):
+        curve = np.roll(way, -int(np.argmin(np.hypot(*(way - desired[0]).T))), axis=0)
+        partner = list(range(len(curve))) if len(curve) == len(desired) else [0]
+        for point in desired[len(partner) :]:
+            ahead = curve[partner[-1] : partner[-1] + span + 1]
+            partner.append(partner[-1] + int(np.argmin(np.hypot(*(ahead - point).T))))
+        d, a = (np.vstack([points, points[:1]]) @ np.array([1.0, 1j]) for points in (desired, curve[partner]))
+        triangles = ((a[:-1] - d[:-1], a[1:] - d[:-1]), (d[1:] - d[:-1], a[1:] - d[:-1]))
+        areas.append(sum(0.5 * float(np.abs((p.conj() * q).imag).sum()) for p, q in triangles))
+    return min(areas)

@@ -25,8 +25,9 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best, printed_error
+from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best
 from .problems import AREA_N, CM2_PER_M2, PROBLEMS
+from .stated_errors import printed_error
 
 NUMBER = "quality"
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]

@@ -26,8 +26,8 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import PRINTED, TARGET, FloatArray, our_error, pairing_area
-from .problems import PROBLEMS, N, ellipse
+from .chapter_6 import PRINTED, TARGET, FloatArray, our_error
+from .problems import PROBLEMS, N, ellipse, pairing_area
 
 PROBLEM = "ellipse-a-bounded"
 #: Bounds of X0, Y0, l1 to l4, r (cm), a1, th20, a2 (rad).

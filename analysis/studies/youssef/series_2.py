@@ -38,9 +38,10 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE, SEEN_FALL, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import ROUNDED, TABLE, best, errors_by_reading, half_units
+from .chapter_6 import TABLE, best
 from .chapter_7 import LIMITS, enclosed_area, reached_area, slider
 from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path
+from .stated_errors import ROUNDED, errors_by_reading, half_units
 
 FloatArray = NDArray[np.float64]
 

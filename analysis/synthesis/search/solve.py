@@ -346,9 +346,7 @@ def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | 
     demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
     if demands and pivot is not None:
         raise InputError(f"{type(demands[0]).__name__} applies only to a fixed rocker pivot: leave it out")
-    if not any(c.seeks for c in demands):
-        return task
-    return replace(task, objective="worst")
+    return replace(task, objective="worst") if any(c.seeks for c in demands) else task
 
 
 def _make_result(
@@ -457,17 +455,19 @@ class TradeOff:
 
 
 class TradedQuantity(NamedTuple):
-    """The quantity traded against the error: name and SI unit of its limit, and whether a smaller limit is tighter."""
+    """The quantity traded against the error: name and SI unit of its limit, and how the limit is shown."""
 
     name: str
     unit: str
-    small: bool
+    factor: float  # shown values per SI value
+    shown: str  # their unit
+    small: bool  # whether a smaller limit is tighter
 
 
 OVER: Mapping[str, TradedQuantity] = {
-    "size": TradedQuantity("largest link", "m", True),
-    "transmission": TradedQuantity("least transmission angle", "rad", False),
-    "pin-force": TradedQuantity("greatest pin force", "N", True),
+    "size": TradedQuantity("largest link", "m", 1e3, "mm", True),
+    "transmission": TradedQuantity("least transmission angle", "rad", degrees(1.0), "deg", False),
+    "pin-force": TradedQuantity("greatest pin force", "N", 1.0, "N", True),
 }
 
 
@@ -547,8 +547,7 @@ def trade_off(
 
 
 def solve_both_ways(
-    order: Sequence[int],
-    search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
+    order: Sequence[int], search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]]
 ) -> tuple[dict[int, Solution], int | None]:
     """Solve a series of problems, from the loosest to the tightest and back, each starting from the previous solutions.
 
@@ -593,11 +592,6 @@ def solve_both_ways(
     return found, None
 
 
-#: Factor and unit in which a limit of a trade-off is written, by its SI unit.
-SHOWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "N": (1.0, "N")}
-
-
 def format_limit(over: str, limit: float) -> str:
     """Format a limit of a trade-off with its unit."""
-    factor, unit = SHOWN[OVER[over].unit]
-    return f"{factor * limit:.6g} {unit}"
+    return f"{OVER[over].factor * limit:.6g} {OVER[over].shown}"
