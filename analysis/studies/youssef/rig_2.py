@@ -1,7 +1,8 @@
-"""Resonance curves of rig 2, Fig 8.19 to 8.21, and the loads on its drive and pins."""
+"""Rig 2: its motion (Fig 8.18), its resonance curves (Fig 8.19 to 8.21), and the loads on its drive and pins."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import sqrt
@@ -14,13 +15,11 @@ from scipy.optimize import minimize_scalar
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, slider_equation, two_harmonics
-from ..rules import ABOUT, ALIKE, SMALL
+from ..rules import ABOUT, ABOUT_DEG, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from . import rigs
-
-# --- 8.19 to 8.21: resonance curves
 
 #: Natural frequencies (rpm) that the thesis sees and calculates, as printed, by spring.
 NATURAL = {"C": ("585", "582"), "D": ("825", "829")}
@@ -36,6 +35,138 @@ WIDTH = (
     "width of the range of speeds at which the amplitude divided by the speed squared is at least 0.71 of its greatest "
     "value (our choice)"
 )
+
+
+# --- 8.18: the motion over the crank angle
+
+
+def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
+    """Return the greatest ratio, over the speeds (rpm), of the amplitude to that of a single mass under an unbalance (cm.kg).
+
+    The single mass is on the same spring and damper.
+    """
+    rates, amplitudes = (
+        RAD_S_PER_RPM * speeds,
+        np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()]),
+    )
+    return float((amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)).max())
+
+
+def judge_motion() -> tuple[Statement, ...]:
+    """Return the statements on the motion of rig 2 over the crank angle, Fig 8.18."""
+    section, speeds, span = "8.4.2.1", RANGE, (RANGE[0], RANGE[-1])
+    sizes = {s: np.array([[rigs.harmonic(rigs.turn(s, w), n) for n in (1, 2)] for w in speeds]) for s in "CD"}
+    ratios = {s: table[:, 1] / table[:, 0] for s, table in sizes.items()}
+    # about the greatest ratio in steps of 1 rpm
+    about = {s: np.clip(speeds[ratio.argmax()] + np.arange(-10.0, 11.0), *span).tolist() for s, ratio in ratios.items()}
+    most = {
+        s: max(rigs.harmonic(rigs.turn(s, w), 2) / rigs.harmonic(rigs.turn(s, w), 1) for w in harmonics)
+        for s, harmonics in about.items()
+    }
+    higher = {s: max(rigs.overtones(rigs.turn(s, w)) for w in speeds) for s in "CD"}
+    largest = max(rigs.largest_multiplier(s, *span) for s in "CD")
+    first = {
+        s: np.array([np.fft.rfft(rigs.slider(rigs.turn(s, w))[:-1])[1] / (0.5 * rigs.SAMPLES) for w in speeds])
+        for s in "CD"
+    }
+    shift = {s: _phase_range(harmonics) for s, harmonics in first.items()}
+    why = "near half the natural frequency the second harmonic has its resonance"
+    almost = f"{ABOUT:g}, the rule for *almost*"
+    return (
+        Statement(
+            "Typical experimentally observed slider oscillations are shown in Fig. (8.18) which exhibit an almost "
+            "sinusoidal behaviour with a phase shift and also periodic in one crank cycle.",
+            text(f"{section}, L6804"),
+            f"share of the speeds from {span[0]:g} to {span[1]:g} rpm, in steps of 10, at which the second harmonic is at most "
+            f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle at all these speeds",
+            f"{almost}; more than half of the speeds, as *typical* says; below 1, as at L6437",
+            (
+                *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
+                at_most("largest multiplier", 1.0, largest),
+            ),
+            "the phase shift is judged in the next sentence",
+        ),
+        Statement(
+            "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
+            "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
+            text(f"{section}, L6808"),
+            "greatest ratio of the second harmonic to the first over the range, in steps of 10 rpm, and of 1 rpm about the "
+            "greatest; change of the phase of the first harmonic over the range",
+            f"{almost}; 90 deg, our choice, half of the change of phase at a resonance",
+            (
+                *(at_most(f"spring {s}, second over first", ABOUT, most[s], why=why) for s in "CD"),
+                *(at_least(f"spring {s}, change of the phase", 90.0, shift[s], "deg") for s in "CD"),
+            ),
+        ),
+        Statement(
+            "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
+            "small in comparison and no evidence of the third and higher harmonics exists.",
+            text(f"{section}, L6814; again 8.4.2.2, L6968"),
+            "second harmonic relative to the first, as in the sentence before; greatest of the harmonics 3 to 6 relative to "
+            f"the greater of the two, the most from {span[0]:g} to {span[1]:g} rpm in steps of 10",
+            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *no evidence* too",
+            tuple(
+                at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
+                for s in "CD"
+                for words, bound, ratio in (
+                    ("the first dominant", 1.0, most),
+                    ("the second small", SMALL, most),
+                    ("the higher ones small", SMALL, higher),
+                )
+            ),
+        ),
+        *_like_one_mass(first, np.array(speeds), about),
+    )
+
+
+def _phase_range(harmonics: NDArray[np.complex128]) -> float:
+    """Return the range of the phase (deg) of complex amplitudes over the speed."""
+    return float(np.degrees(np.ptp(np.unwrap(np.angle(harmonics)))))
+
+
+def _like_one_mass(
+    first: Mapping[str, NDArray[np.complex128]], speeds: NDArray[np.float64], about: Mapping[str, Sequence[float]]
+) -> tuple[Statement, ...]:
+    """Compare the motion of rig 2 with that of a damped mass on a spring.
+
+    ``first`` has the first harmonic (cm, complex) at the speeds (rpm) by spring; ``about`` has further speeds about half the
+    natural frequency.
+    """
+    rates, constant, phase, spread, beyond = RAD_S_PER_RPM * speeds, [], [], [], []
+    for s in "CD":
+        force = first[s] * rigs.complex_stiffness(rigs.rig(s), rates)
+        unbalance = np.abs(force) / rates**2
+        constant.append(at_most(f"spring {s}, F0", 1.0 + ABOUT, np.abs(force).max() / np.abs(force).min()))
+        phase.append(at_most(f"spring {s}, phi", ABOUT_DEG, _phase_range(force), "deg"))
+        spread.append(at_most(f"spring {s}, F0 over the square", ABOUT, np.ptp(unbalance) / unbalance.mean()))
+        ratio = _unbalance_ratio(s, np.unique([*speeds, *about[s]]), float(unbalance.mean()))
+        beyond.append(at_most(f"spring {s}, amplitude", 1.0 + ABOUT, ratio))
+    return (
+        Statement(
+            "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
+            "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
+            text("8.4.2.1, L6820"),
+            "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves "
+            "as the first harmonic of u does, from 300 to 1000 rpm in steps of 10: greatest F0 divided by the least, and "
+            "range of phi. We read both as constant over the speed",
+            f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
+            (*constant, *phase),
+            "F0 grows with the square of the speed, as under an unbalance, see L6970",
+        ),
+        Statement(
+            "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
+            text("8.4.2.2, L6970"),
+            "F0 (L6820) divided by the square of the speed: its range relative to its mean. Then the amplitude of the "
+            "slider, relative to that of such a system under an unbalance whose force is this mean times the square of the "
+            "speed: the greatest ratio from 300 to 1000 rpm, as at L6808",
+            f"{ABOUT:g}, the rule for *similar*",
+            (*spread, *beyond),
+            "near half the natural frequency the second harmonic adds to the first",
+        ),
+    )
+
+
+# --- 8.19 to 8.21: resonance curves
 
 
 @cache
