@@ -16,7 +16,6 @@ from .loop import check_limit as check_limit
 from .loop import control_loop as control_loop
 from .loop import largest_difference as largest_difference
 from .loop import peak as peak
-from .loop import predict_loop as predict_loop
 from .loop import rms as rms
 from .loop import saturate as saturate
 from .model import LinearModel as LinearModel
@@ -32,3 +31,4 @@ from .periodic import Orbit as Orbit
 from .periodic import PeriodicModel as PeriodicModel
 from .periodic import linearise_orbit as linearise_orbit
 from .periodic import settled_motion as settled_motion
+from .prediction import predict_loop as predict_loop

@@ -1,19 +1,15 @@
-"""Simulate a closed loop: a sampled controller with the nonlinear plant or with a linear model of the plant.
-
-In `control_loop` the controller samples the plant, or the plant's FMU, and holds the force for each step, like a digital one.
-`predict_loop` runs the same controller with the linear model.
-"""
+"""Simulate a closed loop: a controller samples the plant, or the plant's FMU, and holds the force for each step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError
 from linkwork.mechanism import Channel, Mechanism
@@ -29,7 +25,6 @@ from ..run import (
     complete_initial_state,
     complete_inputs,
     encode,
-    float_array,
     require_kind,
     sample,
     sample_times,
@@ -37,15 +32,10 @@ from ..run import (
 )
 from ..units import Amount, in_si, si
 from .design import Design, check_period
-from .model import FloatArray, LinearModel, sample_channels
-from .periodic import PeriodicModel
+from .model import FloatArray
 
 #: A constant reference, or a function of time (s) that is sampled with the controller.
 Reference = Amount | Callable[[float], float]
-#: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
-FINE_STEP = 0.03
-#: Greatest rate and acceleration, relative to the mechanism's scales and stiffness, of the state of a model for `predict_loop`.
-AT_REST = 1e-6
 
 
 def saturate(force: float, limit: float) -> float:
@@ -293,7 +283,7 @@ class _Plant(Protocol):
     def step(self, time: float, step: float) -> tuple[int, str]: ...
 
 
-def _run_loop(
+def run_loop(
     plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
 ) -> LoopResult:
     """Reset the controller and run a closed loop: at each sampling time measure, compute the force, and advance the plant."""
@@ -383,7 +373,7 @@ class _Fmu(_DrivenPlant):
         return self.run.step(time, step)
 
 
-def _channel(mechanism: Mechanism, name: str) -> Channel:
+def find_channel(mechanism: Mechanism, name: str) -> Channel:
     """Return the channel with an FMI name; raise InputError if the channel is not a force on a degree of freedom."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
@@ -391,7 +381,7 @@ def _channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is not a force on a freedom of the {mechanism.name}")
 
 
-def _check_argument(channel: Channel, inputs: Inputs) -> None:
+def check_argument(channel: Channel, inputs: Inputs) -> None:
     """Raise InputError if the controller's channel is among the inputs."""
     if channel.argument in inputs:
         raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
@@ -446,8 +436,8 @@ def control_loop(
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
-    channel = _channel(mechanism, controller.channel)
-    _check_argument(channel, inputs)
+    channel = find_channel(mechanism, controller.channel)
+    check_argument(channel, inputs)
     # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)
@@ -456,7 +446,7 @@ def control_loop(
         first = inner.inputs(float(times[0]), float(times[1]), mechanism.state(initial)[:-2])
         modes = {name.replace(".", "_"): value for name, value in inner.modes.items()}
         inner.plant = Plant(mechanism, parameters, initial, tolerance=tolerance, inputs=first, **modes)
-        result = _run_loop(inner, controller, reference, times, channel.freedom)
+        result = run_loop(inner, controller, reference, times, channel.freedom)
         rows, source = np.array(inner.rows), "plant in process"
     else:
         outer = _Fmu(mechanism, inputs, controller.channel, times)
@@ -464,7 +454,7 @@ def control_loop(
         with FmuRun(
             fmu, parameters, initial, modes=outer.modes, inputs=first, start_time=0.0, tolerance=tolerance
         ) as outer.run:
-            result = _run_loop(outer, controller, reference, times, channel.freedom)
+            result = run_loop(outer, controller, reference, times, channel.freedom)
         rows, source = np.array(outer.rows), str(fmu)
     trajectory = Trajectory(
         time=result.time,
@@ -476,149 +466,6 @@ def control_loop(
         parameters=parameters,
     )
     return replace(result, trajectory=trajectory)
-
-
-class _Linear:
-    """Linear model as the plant of a loop: simulates deviations from the model's equilibrium or periodic motion."""
-
-    def __init__(
-        self,
-        model: LinearModel | PeriodicModel,
-        channel: str,
-        inputs: Inputs | None,
-        averaged: bool,
-        deviation: FloatArray,
-    ) -> None:
-        one = model if isinstance(model, LinearModel) else model.mean()
-        self.mechanism, self.places = one.mechanism, one.places
-        self.encoded = None if inputs is None else encode(check_run(self.mechanism, inputs, None)[0], self.mechanism)
-        n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)
-        self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
-        still, acting = one.state[:n], one.channels[forces]
-        self.motion: Callable[[float], FloatArray] = lambda t: still
-        self.acting: Callable[[float], FloatArray] = lambda t: acting
-        if isinstance(model, PeriodicModel):
-            self.motion, self.acting = model.motion(), model.interpolate(model.channels[:, forces])
-        if isinstance(model, LinearModel) or averaged:
-            a, b = one.A, one.B
-            self.a: Callable[[float], FloatArray] = lambda t: a
-            self.b: Callable[[float], FloatArray] = lambda t: b
-        else:
-            self.a, self.b = model.interpolate(model.A), model.interpolate(model.B)
-        self.rate = float(np.abs(np.linalg.eigvals(model.A)).max())
-        self.x = deviation
-        self.t = 0.0
-        self.held: dict[int, float] = {}
-
-    def measure(self) -> Sequence[float]:
-        values = self.motion(self.t).copy()
-        values[self.places] += self.x
-        return [float(value) for value in values]
-
-    def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
-        if self.encoded is not None:
-            x = np.array([*measured, 0.0, 0.0])
-            self.held = dict(enumerate(sample(self.encoded, time, x, self.encoded.source.laws)[self.forces]))
-        self.held[self.own] = force
-
-    def step(self, time: float, step: float) -> tuple[int, str]:
-        count = max(1, ceil(step * self.rate / FINE_STEP))
-        h = step / count
-        # forces that are not held are those of the motion
-        held, forces = list(self.held), np.array(list(self.held.values()))
-
-        def rates(t: float, x: FloatArray) -> FloatArray:
-            change: FloatArray = self.a(t) @ x + self.b(t)[:, held] @ (forces - self.acting(t)[held])
-            return change
-
-        for number in range(count):
-            t = time + number * h
-            k1 = rates(t, self.x)
-            k2 = rates(t + 0.5 * h, self.x + 0.5 * h * k1)
-            k3 = rates(t + 0.5 * h, self.x + 0.5 * h * k2)
-            k4 = rates(t + h, self.x + h * k3)
-            self.x = self.x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        self.t = time + step
-        return 0, ""
-
-
-def predict_loop(
-    model: LinearModel | PeriodicModel,
-    controller: Controller,
-    reference: Reference,
-    inputs: Inputs | None = None,
-    *,
-    stop_time: Amount,
-    deviation: ArrayLike | None = None,
-    averaged: bool = False,
-) -> LoopResult:
-    """Run a closed loop of a controller and the linear model, to predict the result of `control_loop`.
-
-    Parameters
-    ----------
-    model : LinearModel or PeriodicModel
-        Model about an equilibrium or about a periodic motion. The deviations are added to this equilibrium or motion; the run
-        starts at the first sample of the motion.
-    controller, reference, stop_time
-        As for `control_loop`.
-    inputs : Inputs, optional
-        Forces that act; commanded degrees of freedom move as at the operating point. By default all forces are those of the
-        operating point.
-    deviation : array_like, shape (2 n,), optional
-        Deviation of the model's state from its operating point at the start.
-    averaged : bool
-        Whether the time-averaged model of a periodic motion is used instead of the time-periodic model.
-
-    Raises
-    ------
-    InputError
-        If an argument is not usable, or the model is about a single state that is not an equilibrium.
-    """
-    n = model.A.shape[-1]
-    wanted = f"a deviation {deviation!r}: it must be {n} finite numbers"
-    start = np.zeros(n) if deviation is None else float_array(deviation, wanted)
-    if start.shape != (n,) or not np.all(np.isfinite(start)):
-        raise InputError(wanted)
-    channel = _channel(model.mechanism, controller.channel)
-    if controller.channel not in model.input_names:
-        raise InputError(f"the controller acts by {controller.channel}, which is not an input of the model")
-    if isinstance(model, LinearModel):
-        _check_rest(model)
-    if inputs is not None:
-        _check_argument(channel, inputs)
-        _check_inputs(model, inputs)
-    times = sample_times(stop_time, controller.period)
-    plant = _Linear(model, controller.channel, inputs, averaged, start)
-    return _run_loop(plant, controller, reference, times, channel.freedom)
-
-
-def _check_inputs(model: LinearModel | PeriodicModel, inputs: Inputs) -> None:
-    """Raise InputError if an input does not act in a model, or commands another speed than that of the operating point."""
-    mechanism, its = model.mechanism, model.layout
-    for number, channel in enumerate(mechanism.channels):
-        acts = channel.freedom in its.commanded if channel.kind == "command" else number in its.forces
-        if channel.argument in inputs and not acts:
-            coordinate = mechanism.freedoms[channel.freedom].coordinate
-            how = "commanded" if channel.freedom in its.commanded else "not commanded"
-            raise InputError(
-                f"{channel.argument} is among the inputs, but {coordinate} is {how} in the model: leave it out"
-            )
-    times, states = (np.zeros(1), [model.state]) if isinstance(model, LinearModel) else (model.times, model.states)
-    sample_channels(mechanism, inputs, times, np.array(states))
-
-
-def _check_rest(model: LinearModel) -> None:
-    """Raise InputError if a model is not about an equilibrium."""
-    mechanism, n = model.mechanism, len(model.mechanism.freedoms)
-    scale = np.array(mechanism.error_scale(model.parameters, (0.0,) * mechanism.size))[:n]
-    free, size = list(model.layout.free), len(model.layout.free)
-    stiffness = np.abs(model.A[size:, :size] * scale[free] / scale[free, None]).max()
-    moving = np.maximum(np.abs(model.acceleration), np.abs(model.state[n : 2 * n])) / scale
-    if moving.max() > AT_REST * max(1.0, stiffness):
-        raise InputError(
-            f"the model is about a state that is not at rest, most of all in {mechanism.freedoms[int(moving.argmax())].rate}: "
-            "use a model about an equilibrium, or the PeriodicModel of a periodic motion"
-        )
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:

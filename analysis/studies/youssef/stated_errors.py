@@ -9,12 +9,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from ...synthesis import (
-    Linkage,
-    RockerFunction,
-    UntimedPath,
-    evaluate,
-)
+from ...synthesis import Linkage, RockerFunction, UntimedPath, evaluate
 from ...units import CM_PER_METRE
 from ..statements import Case, near
 from .problems import DEG2_PER_RAD2, PROBLEMS, WEIGHT, rocker_function
