@@ -75,6 +75,12 @@ class CaseChoice:
         other = ", or --guess-speed '300 rpm'"
         return rest_guess(self.case.parameters, drive, self.case.initial, speed, other=other)
 
+    def has_crank_speed(self, drive: Any) -> bool:
+        """Return whether a torque drives the crank from a speed that is given, by --guess-speed or in the case."""
+        mechanism = find_mechanism(self.case.parameters)
+        flow = drive.flow(mechanism)
+        return bool(flow.torque and (self.guess_speed or mechanism.state(self.case.initial)[flow.places[-1]] > 0.0))
+
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Print written files and problems; exit with an error code if there are problems or the command was interrupted."""
         common.print_paths(written)

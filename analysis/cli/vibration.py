@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import field_name
 
-from ..display import format_rounds
+from ..display import format_count, format_rounds
 from ..mechanisms import FIVE_BAR, find_mechanism
 from ..units import RAD_S_PER_RPM, display_scale
 from . import common
@@ -178,7 +179,11 @@ def _find_modes(case: Any, over_speed: bool) -> Any:
     from ..periodic import steady_drive
 
     try:
-        drive = steady_drive(case.parameters, case.inputs, case.initial, speed=1.0 if over_speed else None)
+        drive = None
+        with suppress(InputError):
+            drive = steady_drive(case.parameters, case.inputs, case.initial)
+        if drive is None or (over_speed and not drive.speed_drive):
+            drive = steady_drive(case.parameters, case.inputs, case.initial, speed=1.0 if over_speed else None)
         inputs = drive.inputs(find_mechanism(case.parameters))
         return natural_modes(case.parameters, inputs, initial=case.initial)
     except LinkworkError as error:
@@ -419,7 +424,7 @@ def stability(
                 # the user chose nothing on this axis, and the verdict does not need a range
                 over = name and f" over {name}"
                 missing = InputError(f"no chart{over}, as {option} is not given: {error}")
-    _report_verdict(chosen.case.title, parameters, drive, start)
+    _report_verdict(chosen.case.title, parameters, drive, start, begins=chosen.has_crank_speed(drive))
     if missing is not None:
         raise missing
     if not charted:
@@ -470,12 +475,15 @@ def _axis_range(
     return low, high
 
 
-def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
-    """Print the verdict on the stability of the motion at one speed, and for a five-bar the verdict by the linear equation."""
-    from ..periodic import newton_orbit
+def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begins: bool) -> None:
+    """Print the verdict on the stability of the motion that the machine reaches, and for a five-bar that by the linear equation.
+
+    ``start`` is a guess of the motion; the machine is run up slowly, or begins there if ``begins``.
+    """
+    from ..periodic import reached_orbit
     from ..youssef import linear_verdict
 
-    orbit = newton_orbit(parameters, drive, start=start)
+    orbit = reached_orbit(parameters, drive, guess=start, start=start if begins else None)
     turn, (_, size, unit) = orbit.turn(), swing_unit(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     # cranks with a ratio of speeds have a common period; a crank under a torque has only a mean speed
@@ -484,6 +492,9 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
         f"{title} at {rpm:.6g} rpm: {orbit.verdict()}",
         f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
     ]
+    if orbit.others:
+        others = format_count(orbit.others, "other periodic motion")
+        lines.append(f"{others} there: linkwork basins shows which starts lead to each")
     friction = _has_dry_friction(parameters)
     if drive.speed_drive and not friction and find_mechanism(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")

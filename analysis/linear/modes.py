@@ -7,6 +7,7 @@ evenly spaced positions of a turn, finds the equilibrium of all free coordinates
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ..mechanisms import InitialState, Parameters, find_mechanism
-from ..run import Inputs, check_run, complete_initial_state, complete_inputs, takes_published
+from ..run import Inputs, check_run, complete_initial_state, complete_inputs, start_ratio, takes_published
 from ..units import RAD_S_PER_RPM
 from .equilibrium import Equilibrium, find_equilibrium
 from .model import FloatArray, Matrices, evaluate, layout, sample_channels
@@ -109,7 +110,8 @@ def natural_modes(
         Parameters of a mechanism, or a published set or its name. Dry friction is left out: at rest it would hold everything.
     inputs : Inputs, optional
         Constant inputs of the motion. Degrees of freedom with a commanded rate are held; cranks among them pass through the
-        positions of their common period. If no crank is commanded, the first one is held, and its torque left out.
+        positions of their common period. If no crank is commanded, the first one is held, and its torque left out; so is
+        every crank under a motor, which turns with it in the ratio of the speeds in ``initial``.
     initial : initial state, optional
         Position of the held degrees of freedom at the beginning, and guess of the equilibrium there.
     samples : int
@@ -135,7 +137,7 @@ def natural_modes(
     if samples < 1:
         raise InputError(f"samples is {samples}: it must be at least 1")
     parameters = replace(parameters, **{field_name(name): 0.0 for name in mechanism.names("friction")})
-    speeds = _held_speeds(mechanism, inputs)
+    speeds = _held_speeds(mechanism, inputs, initial)
     if set(layout(mechanism, tuple(inputs.modes(mechanism).values())).free) <= speeds.keys():
         forces = [c.argument for c in mechanism.channels if c.kind == "force" and speeds.get(c.freedom) == 0.0]
         raise InputError(
@@ -159,7 +161,7 @@ def natural_modes(
     return _decompose(tuple(found), matrices)
 
 
-def _held_speeds(mechanism: Mechanism, inputs: Inputs) -> dict[int, float]:
+def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int, float]:
     """Return the speeds of the held degrees of freedom by index; zero for those that do not turn."""
     speeds = {}
     for n in layout(mechanism, tuple(inputs.modes(mechanism).values())).commanded:
@@ -169,10 +171,15 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs) -> dict[int, float]:
             raise InputError(f"{inputs}: natural frequencies need constant speeds")
         speeds[n] = constant[0] if mechanism.freedoms[n].period else 0.0
     cranks = [n for n in mechanism.cyclic_freedoms if mechanism.channel_index(n, "command") is not None]
-    if cranks and not any(speeds.values()):
-        first = next((n for n in cranks if n in speeds), cranks[0])
-        speeds[first] = 1.0
-    return speeds
+    if not cranks:
+        return speeds
+    first = next((n for n in cranks if speeds.get(n)), next((n for n in cranks if n in speeds), cranks[0]))
+    commanded = bool(speeds.get(first))
+    speeds[first] = speeds.get(first) or 1.0
+    start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in cranks}
+    begins = speeds[first] if commanded else start[first] or 1.0
+    motors = {c.freedom for c in mechanism.channels if c.kind == "force" and inputs.constants([c.argument]) is None}
+    return {n: float(start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
 
 
 def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:

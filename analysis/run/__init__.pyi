@@ -67,6 +67,7 @@ from .inputs import align as align
 from .inputs import check_run as check_run
 from .inputs import encode as encode
 from .inputs import speed_ratio as speed_ratio
+from .inputs import start_ratio as start_ratio
 from .masses import Mass as Mass
 from .masses import describe_masses as describe_masses
 from .masses import mass_origins as mass_origins

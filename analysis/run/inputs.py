@@ -29,6 +29,8 @@ from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, Sta
 NUMBER = (int, float, np.floating, np.integer)
 #: Largest numerator and denominator of a ratio of crank speeds: beyond it the cranks count as without a common period.
 MOST_TURNS = 100
+#: Largest numerator and denominator of a ratio of speeds at the start that is taken as it is: see `start_ratio`.
+_MOST_AT_START = 6
 _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
 
@@ -282,6 +284,13 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
             f"{value / speed:.9g}, and must be a fraction of whole numbers up to {MOST_TURNS}"
         )
     return ratio
+
+
+def start_ratio(value: float, speed: float) -> Fraction:
+    """Return value / speed, of two speeds at the start of a run, as a fraction of small whole numbers, or else rounded to one."""
+    ratio = Fraction(value / speed).limit_denominator(_MOST_AT_START)
+    exact = abs(ratio * speed - value) <= 1e-9 * abs(value) and abs(ratio.numerator) <= _MOST_AT_START
+    return ratio if exact else Fraction(round(value / speed))
 
 
 def check_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:

@@ -436,6 +436,15 @@ def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
         assert (tmp_path / "out" / f"rig-2-spring-c-stability{name}").exists()
 
 
+def test_stability_judges_the_motion_that_a_weak_motor_reaches(linkwork):
+    case = EXAMPLES / "capture.toml"
+    for speed, amplitude in (("", "21.612 mm"), ("1070 rpm", "3.5693 mm")):  # docs/capture.md
+        begins = ["--guess-speed", speed] if speed else []
+        result = linkwork("stability", case, "--no-chart", *begins)
+        assert f"amplitude {amplitude}" in result.output
+        assert "2 other periodic motions there" in result.output
+
+
 @pytest.mark.slow
 def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, monkeypatch):
     monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import figures
+from analysis import Inputs, figures, find_orbit
 from analysis.linkages import linkage
 from analysis.periodic import (
     Branch,
@@ -25,6 +25,7 @@ from analysis.periodic import (
 from analysis.run import load_case
 from analysis.run.case_files import Case
 from analysis.tuning import Wish, tune
+from analysis.units import RAD_S_PER_RPM
 
 SHAKER = """
 [linkage]
@@ -188,3 +189,45 @@ def test_one_freedom_that_excites_itself_has_torus_points_at_a_prescribed_speed(
         assert normal_form(response.family, point).words == "supercritical"
     lost = [(each.low, each.high) for each in response.speeds_to_avoid if each.risk is Risk.UNSTABLE]
     assert lost == [(9.0, points[0].parameter), (points[1].parameter, 11.0)]
+
+
+def test_the_common_period_of_two_cranks_counts_the_turns_of_a_gear() -> None:
+    """Both rotors turn once while the wheel on the second one turns half: the motion repeats after two turns."""
+    built = linkage("geared-shaker", ground={"O": (0, 0)}).slide("X", body="table", through="O")
+    built.body("table", points={"L": (0, 0), "R": (0, 0.2), "W": (0, 0.3)}, mass=80)
+    for body, point, eccentricity in (("left", "L", 0.05), ("right", "R", 0.05), ("wheel", "W", 0.06)):
+        built.body(body, points={point: (0, 0)}, mass=4, cog=(eccentricity, 0), inertia=0.02)
+    built.gear("teeth", bodies=("right", "wheel"), ratio=-0.5)
+    built.spring("mount", at="X", stiffness="60 kN/m", damping="300 N*s/m")
+    built.freedom("left", "L", speed="600 rpm").freedom("right", "R", speed="600 rpm", driven=True).freedom("x", "X")
+    orbit = find_orbit(built.mechanism().first_set, Inputs(left_speed="600 rpm", right_speed="600 rpm"))
+    assert (orbit.turn().period, orbit.periods) == (pytest.approx(0.2), 1)
+    wanted = np.zeros(2001)
+    for unbalance, speed in ((0.4, 20.0 * pi), (0.24, 10.0 * pi)):
+        across = unbalance * speed**2 / (60e3 - 92.0 * speed**2 + 300j * speed)
+        wanted += (across * np.exp(1j * speed * np.linspace(0.0, 0.2, 2001))).real
+    assert orbit.amplitude == pytest.approx(0.5 * np.ptp(wanted), rel=1e-4)
+
+
+def test_a_drum_behind_a_gear_and_elastic_shafts_has_its_resonance() -> None:
+    """The drum turns -2/5 times for each turn of the rotor, so that its unbalance shakes it at 2/5 of the speed."""
+    built = linkage("line", ground={"A": (0, 0), "B": (0, 0.3), "K": (0, 0), "L": (0, 0.3)}, gravity=9.81)
+    for body, point, inertia in (("rotor", "A", 0.2), ("pinion", "K", 0.01), ("wheel", "B", 0.3)):
+        built.body(body, points={point: (0, 0)}, mass=1, inertia=inertia)
+    built.body("drum", points={"L": (0, 0)}, mass=20, cog=("2 mm", 0), inertia=1.5)
+    built.gear("teeth", bodies=("pinion", "wheel"), ratio=-0.4)
+    built.spring("first", bodies=("rotor", "pinion"), stiffness=4000.0, damping=0.5)
+    built.spring("second", bodies=("wheel", "drum"), stiffness=9000.0, damping=0.8)
+    built.freedom("rotor", "A", speed="300 rpm").freedom("pinion", "K", driven=False).freedom("drum", "L", driven=False)
+    response = frequency_response(built.mechanism().first_set, "1500 rpm", "1640 rpm")
+    (drum,) = (top for top in response.maxima() if top.coordinate == 1)
+    speeds = np.linspace(1565.0, 1578.0, 5201) * RAD_S_PER_RPM
+    turning, g = 0.4j * speeds[:, None, None], -0.4
+    stiffness = np.array([[4000.0 + 9000.0 * g * g, -9000.0 * g], [-9000.0 * g, 9000.0]])
+    damping = np.array([[0.5 + 0.8 * g * g, -0.8 * g], [-0.8 * g, 0.8]])
+    mass = np.diag([0.01 + 0.3 * g * g, 1.5 + 20.0 * 0.002**2])
+    load = np.broadcast_to([[0.0], [20.0 * 0.002 * 9.81]], (len(speeds), 2, 1))
+    swing = np.abs(np.linalg.solve(stiffness + turning * damping + turning**2 * mass, load))[:, 1, 0]
+    assert drum.parameter == pytest.approx(speeds[swing.argmax()], rel=1e-4)
+    assert drum.amplitude == pytest.approx(swing.max(), rel=1e-3)
+    assert {avoided.risk for avoided in response.speeds_to_avoid} == {Risk.RESONANCE}

@@ -26,6 +26,7 @@ from ...run import (
     complete_initial_state,
     complete_inputs,
     speed_ratio,
+    start_ratio,
     takes_published,
 )
 from ...units import Amount, in_si
@@ -178,6 +179,10 @@ class Drive:
         crank, to another crank or to a link with a ratio has the ratio that does not wind this spring up.
         """
         given = {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
+        return self._with_coupled(mechanism, given)
+
+    def _with_coupled(self, mechanism: Mechanism, given: dict[int, Fraction]) -> dict[int, Fraction]:
+        """Return the ratios ``given`` and those that follow from them and the crank through springs that couple rotations."""
         if not any(freedom.coupled for freedom in mechanism.freedoms):
             return given
         turning, acting = {self.reference(mechanism).freedom: Fraction(1)} | given, {*self.forces, *self.motors}
@@ -222,14 +227,13 @@ class Drive:
         chosen = self.arguments(mechanism)
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
         freedoms = mechanism.freedoms
-        common = lcm(*(ratio.denominator for n, ratio in ratios.items() if not freedoms[n].swings))
-        # ratio of each link that goes round, in whole turns of the crank and of the link
-        rounds = (
-            ratio * _whole_turns(freedoms[crank.freedom]) / _whole_turns(freedoms[n])
-            for n, ratio in ratios.items()
-            if freedoms[n].swings
-        )
-        base = lcm(common, *(of.denominator for of in rounds))
+        # ratios in whole turns; springs that couple links to the cranks fix the ratios of these links, too
+        whole = {
+            n: ratio * _whole_turns(freedoms[crank.freedom]) / _whole_turns(freedoms[n]) for n, ratio in ratios.items()
+        }
+        fixed = self._with_coupled(mechanism, {n: ratio for n, ratio in ratios.items() if not freedoms[n].swings})
+        common = lcm(*(of.denominator for n, of in whole.items() if n in fixed))
+        base = lcm(common, *(of.denominator for of in whole.values()))
         made = flow(mechanism, modes, crank.freedom, base, base // common)
         for number in made.others:
             name = mechanism.freedoms[number].coordinate
@@ -549,8 +553,8 @@ def _choose_crank(
     """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the other cranks.
 
     This crank is the first crank that is commanded at a positive speed, or else the first crank. The ratios, by index of the
-    degree of freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, rounded to a whole
-    number, unless it begins at rest and a spring couples it, see `Drive.ratios_by_freedom`.
+    degree of freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, see `start_ratio`,
+    unless it begins at rest and a spring couples it, see `Drive.ratios_by_freedom`.
     """
     if len(mechanism.cyclic_freedoms) < 2:
         return find_crank(mechanism), {}
@@ -571,7 +575,7 @@ def _choose_crank(
                 else Fraction(0)
             )
         elif n != first and speed != 0.0 and (start[n] != 0.0 or not mechanism.freedoms[n].coupled):
-            ratios[n] = Fraction(round(start[n] / speed))
+            ratios[n] = start_ratio(start[n], speed)
     return crank, ratios
 
 

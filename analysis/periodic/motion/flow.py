@@ -108,7 +108,7 @@ class Flow:
     base : int
         Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
     commons : int
-        Number of common periods of the cranks alone in ``base`` periods of the crank.
+        Number of common periods of the cranks, and of what springs couple to them, in ``base`` periods of the crank.
 
     Attributes
     ----------

@@ -386,17 +386,34 @@ def find_orbit(
     drive = steady_drive(parameters, inputs, initial, speed=speed, torque=torque)
     if not settle or (start is not None and drive.speed_drive):
         return newton_orbit(parameters, drive, turns=turns, start=start, settle=settle)
+    return reached_orbit(parameters, drive, turns=turns, guess=start, start=start)
+
+
+@takes_published()
+def reached_orbit(
+    parameters: Parameters,
+    drive: Drive,
+    *,
+    turns: int = 1,
+    guess: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+) -> PeriodicOrbit:
+    """Find the periodic motion that a machine reaches under a `Drive`: see `find_orbit`.
+
+    The search begins at ``guess``. If ``start`` is given, the machine under a torque or a motor begins there; otherwise it is
+    run up slowly, if that is possible.
+    """
     try:
-        first = newton_orbit(parameters, drive, turns=turns, start=start)
+        first = newton_orbit(parameters, drive, turns=turns, start=guess)
     except OrbitError as error:
         failure, first = error, None
-    found = search_orbits(parameters, drive, turns=turns, start=start, known=() if first is None else (first,))
+    found = search_orbits(parameters, drive, turns=turns, start=guess, known=() if first is None else (first,))
     if not found.orbits:
         if first is None:
             raise failure
         # the motion repeats itself after fewer turns than were asked for
         return replace(first, others=0)
-    met = _reached_motion(found, drive, turns, first, start)
+    met = _reached_motion(found, drive, turns, first, guess, start)
     return replace(met, others=sum(orbit is not met for orbit in found.orbits))
 
 
@@ -601,11 +618,16 @@ class _FoundMotions:
 
 
 def _reached_motion(
-    found: Orbits, drive: Drive, turns: int, first: PeriodicOrbit | None, start: ArrayLike | None
+    found: Orbits,
+    drive: Drive,
+    turns: int,
+    first: PeriodicOrbit | None,
+    near: ArrayLike | None,
+    start: ArrayLike | None,
 ) -> PeriodicOrbit:
     """Return the motion that a machine reaches: the stable motion nearest to the motion on which the machine settles.
 
-    ``first`` is the motion that Newton's method found from the first guess, or None. If no motion is stable, or if a link may
+    The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's method found from the first guess, or None. If no motion is stable, or if a link may
     go round and no stable motion is near, ``first`` is returned. If no motion is stable and ``first`` is None, the result is
     the motion of the smallest amplitude.
     """
@@ -615,7 +637,7 @@ def _reached_motion(
     if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):
         return stable[0]
     point = operating_point(stable[0].parameters, drive)
-    guess = first_guess(point.flow, drive, start)
+    guess = first_guess(point.flow, drive, near)
     arrived, pace = None, None if drive.speed is None and start is not None else _speed_of_drive(drive)
     if pace is not None and pace > 0.0 and turns == 1:
         last = sweep(point.parameters, np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS), drive=drive).orbits[-1]
