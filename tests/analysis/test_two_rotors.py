@@ -25,6 +25,7 @@ from analysis import (
     cosimulate,
     figures,
     frequency_response,
+    natural_modes,
     simulate,
     simulate_many,
     steps,
@@ -46,6 +47,7 @@ from analysis.periodic import (
     newton_orbit,
     plane,
     stability_chart,
+    steady_drive,
     sweep,
 )
 from analysis.periodic.motion.orbit import first_guess
@@ -194,6 +196,21 @@ def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_a
     at = min(response.branches[0].orbits, key=lambda point: abs(point.drive.speed - 24.0))
     again = newton_orbit(P, at.drive, start=at.start, settle=False)
     np.testing.assert_allclose(again.start, at.start, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize(("right", "ratio"), [(20.3, 1), (30.0, Fraction(3, 2)), (41.0, 2)])
+def test_rotors_on_motors_have_the_ratio_of_their_first_speeds_and_are_held_for_natural_frequencies(
+    right: float, ratio: Fraction
+) -> None:
+    motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.1)
+    initial = MECHANISM.initial(left_speed=20.0, right_speed=right)
+    for inputs in (Inputs(left_torque=motor, right_torque=motor), Inputs(left_speed=20.0, right_torque=motor)):
+        assert steady_drive(P, inputs, initial).ratios == {"right.angle": ratio}
+        modes = natural_modes(P, inputs, initial=initial)
+        assert modes.coordinates == ("cart.position",)
+        np.testing.assert_allclose(modes.frequencies, sqrt(K.k / K.mass), rtol=1e-3)
+        turned = np.ptp([rest.coordinates[1] for rest in modes.equilibria])
+        assert turned == pytest.approx(2.0 * pi * ratio * Fraction(ratio).denominator * 35 / 36)
 
 
 def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:
