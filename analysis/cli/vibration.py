@@ -476,7 +476,7 @@ def _axis_range(
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begins: bool = False) -> None:
-    """Print the verdict on the stability of the motion that the machine reaches, and for a five-bar that by the linear equation.
+    """Print the verdict on the stability of the motion that is reached, and for a five-bar that by the linear equation.
 
     ``start`` is a guess of the motion; the machine is run up slowly, or begins there if ``begins``.
     """

@@ -59,8 +59,8 @@ from .motion.search import Orbits as Orbits
 from .motion.search import Sweep as Sweep
 from .motion.search import find_orbit as find_orbit
 from .motion.search import find_orbits as find_orbits
-from .motion.search import reached_orbit as reached_orbit
 from .motion.search import join_orbits as join_orbits
+from .motion.search import reached_orbit as reached_orbit
 from .motion.search import search_orbits as search_orbits
 from .motion.search import sweep as sweep
 from .motion.search import unsought_hint as unsought_hint

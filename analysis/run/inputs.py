@@ -287,7 +287,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
 
 
 def start_ratio(value: float, speed: float) -> Fraction:
-    """Return value / speed, of two speeds at the start of a run, as a fraction of small whole numbers, or else rounded to one."""
+    """Return value / speed, of speeds at the start of a run, as a fraction of small whole numbers, or else rounded."""
     ratio = Fraction(value / speed).limit_denominator(_MOST_AT_START)
     exact = abs(ratio * speed - value) <= 1e-9 * abs(value) and abs(ratio.numerator) <= _MOST_AT_START
     return ratio if exact else Fraction(round(value / speed))

@@ -627,9 +627,9 @@ def _reached_motion(
 ) -> PeriodicOrbit:
     """Return the motion that a machine reaches: the stable motion nearest to the motion on which the machine settles.
 
-    The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's method found from the first guess, or None. If no motion is stable, or if a link may
-    go round and no stable motion is near, ``first`` is returned. If no motion is stable and ``first`` is None, the result is
-    the motion of the smallest amplitude.
+    The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's
+    method found from the first guess, or None. If no motion is stable, or if a link may go round and no stable motion is near,
+    ``first`` is returned. If no motion is stable and ``first`` is None, the result is the motion of the smallest amplitude.
     """
     stable = found.stable
     if not stable:
