@@ -8,9 +8,19 @@ from math import pi
 import numpy as np
 import pytest
 
-from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
+from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate, variant
 from analysis.linkages import linkage
-from analysis.periodic import Drive, OrbitError, Stability, basins, confirm, newton_orbit, sweep
+from analysis.periodic import (
+    Drive,
+    OrbitError,
+    Risk,
+    Stability,
+    basins,
+    confirm,
+    frequency_response,
+    newton_orbit,
+    sweep,
+)
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
@@ -77,6 +87,19 @@ def test_basins_do_not_depend_on_the_length_of_the_bodies() -> None:
     short, long = (basins(duffing(length), Drive(speed=36.0), points=6, **plane) for length in (0.1, 2.0))
     assert short.ends.tolist() == long.ends.tolist()
     assert set(short.ends.ravel()) == {0, 1}
+
+
+@pytest.mark.parametrize("damping", [0.75, 0.8, 1.0])
+def test_a_resonance_beside_a_fold_is_found(damping: float) -> None:
+    """Peak by harmonic balance, where the backbone meets the amplitude that the damper allows; a fold is within 1e-4 of it."""
+    rig = variant(duffing(0.1), spring_damping=damping)
+    response = frequency_response(rig, 10.0, 90.0)
+    (peak,) = response.maxima()
+    ratio = 0.05 * 0.01 / damping
+    speed = np.sqrt(900.0 / (1.05 - 0.75 * 2.5e6 * ratio**2))
+    assert (peak.parameter, peak.amplitude) == (pytest.approx(speed, rel=0.06), pytest.approx(ratio * speed, rel=0.06))
+    avoided = [a for a in response.speeds_to_avoid if a.risk is Risk.RESONANCE and a.high > 32.0]
+    assert [a.high for a in avoided] == [pytest.approx(peak.parameter, rel=1e-4)]
 
 
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])

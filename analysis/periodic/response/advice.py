@@ -291,15 +291,17 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 def _resonances(arc: Arc, coordinate: int) -> list[Interval]:
     """Return the half-power bands of the peaks of a coordinate's amplitude along an arc, as ranges of the parameter.
 
-    An end of the arc also counts as a peak if the amplitude is greatest there and the branch continues on another arc.
+    An end of the arc also counts as a peak if the amplitude is greatest there, or just before it as beside a fold, and if the
+    branch continues on another arc.
     """
     a = arc.amplitudes[:, coordinate]
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc.parameter, a, top, way) for way in (-1, 1)) for top in tops]
     # an end counts only if the amplitude falls below half power on the arc; otherwise it may be a point on a slope
     for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
-        if arc.turns == 1 and cut and a[end] == a.max() and a.min() < HALF_POWER * a[end]:
-            bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc.parameter, a, end, way)))))
+        top = int(a.argmax())
+        if arc.turns == 1 and cut and a[end] >= (1.0 - _PROMINENCE) * a[top] and a.min() < HALF_POWER * a[top]:
+            bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc.parameter, a, top, way)))))
     return [(low, high) for low, high in bands if isfinite(low) and isfinite(high)]
 
 
@@ -386,11 +388,10 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
         for i, prominence in peaks(amplitude):
             if prominence < _PROMINENCE * abs(amplitude[i]):
                 continue
-            a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-            # at a fold the parameter turns back: this is not an extremum over the parameter
-            if not a < branch.parameter[i] < c:
+            located = _locate_extremum(branch, i, sign, number)
+            if located is None:
                 continue
-            place, orbit = _locate_extremum(branch, i, a, c, sign, number)
+            place, orbit = located
             found.append(
                 Extremum(
                     parameter=place,
@@ -403,30 +404,38 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     return tuple(found)
 
 
-def _locate_extremum(
-    branch: Branch, point: int, a: float, c: float, sign: int, coordinate: int
-) -> tuple[float, PeriodicOrbit]:
+def _locate_extremum(branch: Branch, point: int, sign: int, coordinate: int) -> tuple[float, PeriodicOrbit] | None:
     """Find an extremum of a coordinate's amplitude; return the value of the parameter, and the motion there.
 
-    The search starts from the motion with the index ``point`` on the branch, and stays between the values a and c of the
-    parameter. ``sign`` is +1 for a maximum, -1 for a minimum.
+    The search starts from the motion with the index ``point`` on the branch, and stays between the values of the parameter at
+    its neighbours. If the parameter turns back there, the extremum lies beside the fold, often so near that it is not told from
+    the fold. The result is None if there is no fold, as at a branch point. ``sign`` is +1 for a maximum, -1 for a minimum.
     """
     family, orbit, begin = branch.family, branch.orbits[point], float(branch.parameter[point])
+    a, c = sorted((float(branch.parameter[point - 1]), float(branch.parameter[point + 1])))
+    folded = not a < begin < c
+
+    def nearby_orbit(value: float, near: FloatArray = orbit.start) -> PeriodicOrbit:
+        parameters, drive = family.operation(value)
+        return newton_orbit(parameters, drive, turns=orbit.turns, start=near, settle=False)
+
     if isinstance(family.vary, str):
         try:
+            if folded:
+                reach = max(abs(a - begin), abs(c - begin))
+                a, c = begin - reach, begin + reach
+                orbit = nearby_orbit(*_interpolate_extremum(branch, point, coordinate))
             rested = extremum_orbit(orbit, family.vary, coordinate)
         except LinkworkError:
             pass
         else:
             place = parameter_value(rested.parameters, rested.drive, family.vary)
-            was, now = orbit.amplitudes[coordinate], rested.amplitudes[coordinate]
+            was, now = branch.amplitudes[point, coordinate], rested.amplitudes[coordinate]
             if a < place < c and sign * (now - was) > -_SAMPLED * was:
                 return place, rested
-
-    def nearby_orbit(value: float) -> PeriodicOrbit:
-        parameters, drive = family.operation(value)
-        return newton_orbit(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
-
+    if folded:
+        folds = (s for s in branch.special if s.kind is Crossing.FOLD and s.after in (point - 1, point))
+        return next(((fold.parameter, fold.orbit) for fold in folds), None)
     try:
         best = scipy.optimize.minimize_scalar(
             lambda value: -sign * float(nearby_orbit(value).amplitudes[coordinate]),
@@ -438,6 +447,21 @@ def _locate_extremum(
     except OrbitError:
         # near the limit of assembly a neighbour at a fixed parameter may not be found: keep the point itself
         return begin, orbit
+
+
+def _interpolate_extremum(branch: Branch, point: int, coordinate: int) -> tuple[float, FloatArray]:
+    """Return parameter and start of a motion at the vertex of the parabola through the amplitudes of three points of a branch.
+
+    The amplitude is a function of the length along the curve of amplitude and parameter, which passes a fold smoothly.
+    """
+    places = slice(point - 1, point + 2)
+    amplitude, parameter = branch.amplitudes[places, coordinate], branch.parameter[places]
+    steps = np.hypot(np.diff(amplitude) / np.ptp(amplitude), np.diff(parameter) / np.ptp(parameter))
+    length = np.array([-steps[0], 0.0, steps[1]])
+    curve, slope, _ = np.polyfit(length, amplitude, 2)
+    others = np.column_stack([parameter, *np.array([orbit.start for orbit in branch.orbits[places]]).T])
+    vertex = np.polyfit(length, others, 2).T @ np.array([(slope / (2.0 * curve)) ** 2, -slope / (2.0 * curve), 1.0])
+    return float(vertex[0]), vertex[1:]
 
 
 def special_gradient(
