@@ -376,7 +376,7 @@ def test_a_motion_that_the_speed_prescribes_is_refused_with_what_works_instead()
         ({"no_jump": True, "change": {}}, InputError, "nothing may be changed"),
         ({"no_jump": True, "change": {"slider.stifness": "5 %"}}, UnknownNameError, r"slider\.stiffness"),
         ({"no_jump": True, "change": {"gravity": "5 %"}}, ParameterError, "it is zero now"),
-        ({"no_jump": True, "change": {"drive.speed": "5 %"}}, ParameterError, "range is that of this quantity"),
+        ({"no_jump": True, "change": {"drive.speed": "5 %"}}, ParameterError, "whose range is given"),
         ({"no_jump": True, "change": {"drive.torque": "0.1 N*m"}}, InputError, "the drive is by speed"),
         ({"no_jump": True, "change": {"slider.stiffness": [5e3, 4e3]}}, ParameterError, "in order"),
         ({"no_jump": True, "change": {"slider.stiffness": {"tolerance": "0 %"}}}, ParameterError, "above zero"),
