@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.studies.statements import HOLDS, Statement
-from analysis.studies.youssef.conclusions import decay, maxima_spacings
 from analysis.studies.youssef.conclusions_linear import judge_introduction, judge_linearised
+from analysis.studies.youssef.conclusions_motion import decay, maxima_spacings
 
 from .results import check, expected
 
