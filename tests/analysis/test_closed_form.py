@@ -87,6 +87,26 @@ def test_dyads_of_five_poses_keep_their_length(seed: int) -> None:
     assert len(found.solutions) == n * (n - 1)
 
 
+def test_a_slide_is_no_link() -> None:
+    """The poses of a slider-crank's coupler: the pivot of the link in place of its slide is at infinity."""
+    made = syn.SliderCrank(
+        ground_length=0.02, crank_length=0.05, coupler_length=0.17, point_distance=0.1, point_angle=0.4, crank_phase=0.2
+    )
+    at = np.array([0.0, 0.4, 0.9, 1.3, 1.9])
+    found = syn.guidance(syn.PrecisionPoints(points=made.path(at), angle=made.coupler_angle(at)))
+    assert isinstance(found, syn.Guidance)
+    assert (len(found.dyads), found.slides, len(found.solutions)) == (3, 1, 6)
+    assert "3 of 4 possible links guide the body, and 1 slide in place of a link" in found.describe()
+    assert max(s.evaluation.worst for s in found.sound) < 1e-12
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_a_body_that_does_not_turn_is_refused(n: int) -> None:
+    points = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 0.0]]
+    with pytest.raises(InputError, match="the body does not turn"):
+        syn.guidance(syn.PrecisionPoints(points=points[:n], angle=[0.3] * n))
+
+
 @pytest.mark.parametrize("seed", [0, 3, 5, 8])
 def test_no_dyad_is_missed(seed: int) -> None:
     """SciPy's root finder from 300 places, on the distances themselves, finds the same real dyads."""

@@ -36,6 +36,8 @@ Poses = PrecisionPoints | Motion
 INDEPENDENT = 1e-10
 #: Largest imaginary part, in units of the poses' size, with which a dyad counts as real.
 REAL = 1e-7
+#: Distance, in units of the poses' size, beyond which an end of a dyad counts as infinite: a slide is in its place.
+FAR = 1e3
 #: Number of lines through a pole that sample the curve of four poses: each meets the curve in two further points.
 CURVE_POINTS = 180
 #: Greatest length of links in the map of four poses, in units of the poses' size; the same as in a search without bounds.
@@ -94,6 +96,8 @@ class Guidance(Exact):
         The real dyads; five poses have four, two or none.
     complex_dyads : int
         Number of complex dyads, which cannot be built.
+    slides : int
+        Number of dyads with an end at infinity: a slide guides the body in their place, and no four-bar contains them.
     nearest_complex : float
         Least imaginary part of the complex dyads, as a fraction of the poses' size. If this number is close to zero, a small
         change of the poses makes a pair of dyads real. Infinite if all dyads are real.
@@ -104,13 +108,16 @@ class Guidance(Exact):
     task: Poses
     dyads: tuple[Dyad, ...]
     complex_dyads: int
+    slides: int
     nearest_complex: float
     solutions: tuple[Solution, ...]
 
     def describe(self) -> str:
         """Return a sentence that says how many linkages there are."""
-        possible = len(self.dyads) + self.complex_dyads
+        possible = len(self.dyads) + self.complex_dyads + self.slides
         there = f"{len(self.dyads)} of {possible} possible links guide the body"
+        if self.slides:
+            there += f", and {format_count(self.slides, 'slide')} in place of a link"
         if not self.solutions:
             return f"{there}: no four-bar carries a body through these poses"
         linkages = format_count(len(self.solutions) // 2, "four-bar")
@@ -259,6 +266,12 @@ def _forms() -> tuple[FloatArray, FloatArray]:
 _FORMS = _forms()
 
 
+_DEPENDENT_POSES = (
+    "the poses are not independent: two of them are the same, or the body does not turn between them; then there are "
+    "infinitely many dyads. Change a pose, or leave one out"
+)
+
+
 def _null_space(rows: FloatArray, size: int) -> FloatArray:
     """Return a basis of the null space of the matrix ``rows`` as columns; ``size`` is their number.
 
@@ -266,10 +279,7 @@ def _null_space(rows: FloatArray, size: int) -> FloatArray:
     """
     _, values, right = np.linalg.svd(rows)
     if values[-1] < INDEPENDENT * values[0]:
-        raise InputError(
-            "the poses are not independent: two of them are the same, or the body does not turn between them; then there are "
-            "infinitely many dyads. Change a pose, or leave one out"
-        )
+        raise InputError(_DEPENDENT_POSES)
     return right[-size:].T
 
 
@@ -315,11 +325,18 @@ def _refine_dyad(rows: FloatArray, v: ComplexArray) -> ComplexArray:
     return v
 
 
+def real_dyads(z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which dyads of `dyads_of_five` are real and finite, and which are real with an end at infinity."""
+    both = np.column_stack([z, m])
+    size, off = np.abs(both).max(axis=1), np.abs(both.imag).max(axis=1)
+    return (size <= FAR) & (off <= REAL), (size > FAR) & (off <= REAL * size)
+
+
 def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidance:
     unit = normal_form(task).unit
     z, m = dyads_of_five(p / unit, angle)
     off = np.abs(np.column_stack([z, m]).imag).max(axis=1)
-    real = off <= REAL
+    real, far = real_dyads(z, m)
     dyads = tuple(
         Dyad(
             pivot=p[0] + unit * complex(mx.real, my.real),
@@ -336,8 +353,9 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
     return Guidance(
         task=task,
         dyads=dyads,
-        complex_dyads=int((~real).sum()),
-        nearest_complex=float(off[~real].min(initial=np.inf)),
+        complex_dyads=int((~real & ~far).sum()),
+        slides=int(far.sum()),
+        nearest_complex=float(off[~real & ~far].min(initial=np.inf)),
         solutions=rank_solutions(made),
     )
 
@@ -417,6 +435,8 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     _null_space(rows, 4)
     e = np.exp(1j * (angle[1:] - angle[0]))
     chosen = int(np.argmax(np.abs(e - 1.0)))
+    if abs(e[chosen] - 1.0) < INDEPENDENT:
+        raise InputError(_DEPENDENT_POSES)
     pole = -(p[chosen + 1] - p[0]) / (e[chosen] - 1.0)
     others = [j for j in range(3) if j != chosen]
     nearer: list[complex] = []
@@ -437,7 +457,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     z = np.array(nearer + farther)
     lines = np.array([[_pivot_line(row, at) for row in rows] for at in z])
     m = np.array([np.linalg.lstsq(a[:, :2], -a[:, 2], rcond=None)[0] for a in lines]) @ np.array([1.0, 1j])
-    near = (np.abs(z) < 1e3) & (np.abs(m) < 1e3)
+    near = (np.abs(z) < FAR) & (np.abs(m) < FAR)
     return z[near], m[near]
 
 

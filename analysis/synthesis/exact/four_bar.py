@@ -28,7 +28,7 @@ from ...units import Amount, in_si
 from ..linkage.linkage import Linkage, wrap_angles
 from ..result.solution import Solution, rank_solutions
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, turn
-from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
+from .burmester import INDEPENDENT, Exact, dyads_of_five, exact_solution, real_dyads
 
 FloatArray = NDArray[np.float64]
 #: Lengths of crank, coupler and rocker in units of the ground link; crank phase and mounting angle of the output (rad).
@@ -184,7 +184,7 @@ def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
         parts = dyads_of_five(places, psi - phi)
     except InputError:
         raise InputError(_DEPENDENT_POINTS) from None
-    real = np.abs(np.hstack(parts).imag).max(axis=1) <= REAL
+    real, _ = real_dyads(*parts)
     z, m = (part[real].real @ np.array([1.0, 1j]) for part in parts)
     m = places[0] + m
     there = np.arange(len(z)) != np.argmin(np.abs(z) + np.abs(m))
