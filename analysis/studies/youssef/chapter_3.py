@@ -234,8 +234,9 @@ def _shape_statements() -> list[Statement]:
             "takes a constant value between the maximum and minimum values of the oscillation on the portions of the "
             "curve below the zero degree crank angle positions.",
             text("3.2.1, L1976-1986"),
-            "distance of u from the best line parallel to the chord from the greatest to the least u, which comes before 360 "
-            "deg with these springs, ours; relative to its range",
+            "greatest distance of u, on the way from its greatest to its least value, from the best line parallel to the chord "
+            "between the two, relative to the range of u. The springs are our choice: with them the least value comes before "
+            "360 deg",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
             "the slider swings on the spring several times a turn; in the limit u is the inertia force over k",

@@ -292,7 +292,8 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
         Statement(
             "The width of the region increases with increase of [sigma2].",
             text("5.3.1, L3876; the same in L3938-3942"),
-            "growth of the width from one sigma2 to the next, the least of 0.01 to 0.1 in steps of 0.01; true periodic motion",
+            "least growth of the width from one sigma2 to the next, from 0.01 to 0.1 in steps of 0.01; for the true periodic "
+            "motion",
             SIGN,
             (at_least("", 0.0, np.diff(widths(true)).min()),),
         ),

@@ -134,8 +134,9 @@ def judge_introduction() -> tuple[Statement, ...]:
             "The resonance analysis showed a behaviour similar to a second order system while the stability analysis showed "
             "instability in the second region, i. e. in the vicinity of twice the natural frequency only.",
             text("8.0, L6057"),
-            "amplitude as at L7102; speed in the middle of the region near twice the natural frequency over this frequency, "
-            "and width of the region at the natural frequency, as at L7116",
+            "for the resonance, the difference of the amplitude from that of a single mass, as at L7102. For the stability, as "
+            "at L7116: speed in the middle of the region near twice the natural frequency, relative to this frequency, and "
+            "width of the region at the natural frequency",
             f"{ABOUT:g}, the rule for *similar* and, of 2, for *near*, for *vicinity* too; {SMALL:g}, the rule for "
             "*negligible*, for a region that is not counted",
             (

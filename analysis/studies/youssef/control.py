@@ -370,8 +370,9 @@ def judge_strategy() -> tuple[Statement, ...]:
             "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
             "results in each case.",
             text("7.4, L6026"),
-            "*optimum* is read as the least that we find: error of the printed four-bars, mended, over it, as at L7026; error "
-            "of the two printed series, as at L5935, over the least with as many harmonics and the same links",
+            "*optimum* is read as the least error that we find. Error of the printed four-bars, mended, relative to it, as at "
+            "L7026; error with the two printed series, as at L5935, relative to the least with as many harmonics and the same "
+            "links",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
             (
                 *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),

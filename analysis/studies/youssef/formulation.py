@@ -376,9 +376,9 @@ def _closure_statements() -> list[Statement]:
             "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "
             "checks, only if used in conjunction with the first approach.",
             text("3.1, L1748-1755"),
-            "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, over "
-            "its failure of closure; Hamming's method, at 420 rpm",
-            "more than 100, ours as above: the check shows nothing of the error",
+            "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, "
+            "divided by its failure of closure; Hamming's method, at 420 rpm",
+            "more than 100, our choice as above: then the check shows nothing of the error",
             tuple(at_least(name, 100.0, run.errors[1] / run.unseen) for name, run in found.items()),
         ),
         Statement(
@@ -466,9 +466,10 @@ def _one_step_statements() -> list[Statement]:
             "formulation of the equations of the motion because of the large number of equations, and hence the lengthy "
             "time involved in computation of the function [Phi].",
             text("2.4, L1340-1356"),
-            "evaluations of Phi in a step of the classical method; its greatest error of u at 420 rpm, by each approach of "
-            "3.1, over that of Hamming's with half the step, which takes as many evaluations, and so as much time for them",
-            "none of a count; more than 1, the sign, as *unfavourable* says",
+            "number of evaluations of Phi in a step of the classical method. Then its greatest error of u at 420 rpm, by each "
+            "approach of 3.1, divided by that of Hamming's method with half the step, which takes as many evaluations and so "
+            "as much time for them",
+            "none for the number; more than 1, the sign alone, as *unfavourable* says",
             (
                 replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
                 *(
@@ -513,12 +514,14 @@ def _hamming_statements() -> list[Statement]:
             "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
             "methods are highly stable.",
             text("2.4, L1379-1387"),
-            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in a step of {1e3 * STEP:g} ms at 420 "
-            f"rpm: over the error; its change over roundings to {CM_PER_METRE * UNIT:g} cm, and over an error of the start "
-            f"(*inherent*, so read) of {CM_PER_METRE * START_ERROR:g} cm; factor per step of the spurious solution of Milne's "
-            "corrector, for y' = -y with the step 0.1, ours",
-            "0.5 to 2, ours: an estimate within a factor of 2 is of use; at most 1, as *convergent* says; one counterexample "
-            "refutes *in all cases*",
+            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in steps of {1e3 * STEP:g} ms at 420 "
+            "rpm. For *truncation*: greatest estimate divided by the greatest error. For *roundoff*: change of the estimate "
+            f"when u is rounded to {CM_PER_METRE * UNIT:g} cm, divided by the rounding (rms values). *Inherent* is read as an "
+            f"error of the start: greatest change of the estimate when u is wrong by {CM_PER_METRE * START_ERROR:g} cm there, "
+            "divided by this error. For *convergent*: factor per step by which the spurious solution of Milne's corrector "
+            "grows, for y' = -y with the step 0.1 (our example)",
+            "0.5 to 2, our choice, since an estimate within a factor of 2 is useful; at most 1, as *convergent* says: one "
+            "counterexample refutes *in all cases*",
             (
                 Case(label="estimate of the truncation", computed=truncation, lower=0.5, upper=2.0),
                 Case(

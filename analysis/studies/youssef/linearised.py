@@ -281,9 +281,9 @@ def _kinematics() -> list[Statement]:
         Statement(
             "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
             text("4.1, eqs (4.2) to (4.8), L2459-2477"),
-            f"residuals of (4.5) and (4.7) with xi3 and xi4 by (4.8), relative to sigma2 = {SHORT[0]:g}; order in sigma2, down "
-            f"to {SHORT[1]:g}, of the errors of xi3 and xi4 against the closed linkage; greatest over a turn at zeta = "
-            f"sigma2/2, sigma = 1 and sigma3 = {COUPLER:g}, ours",
+            f"residuals of (4.5) and (4.7) with xi3 and xi4 by (4.8), relative to sigma2 = {SHORT[0]:g}. Then the order in "
+            f"sigma2, from {SHORT[0]:g} to {SHORT[1]:g}, of the errors of xi3 and xi4 compared with the closed linkage. The "
+            f"greatest values over a turn, at zeta = sigma2/2, sigma = 1 and sigma3 = {COUPLER:g} (our choice)",
             f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
             "a whole number",
             (
@@ -374,16 +374,19 @@ def _simplification() -> list[Statement]:
 
 def _balance() -> list[Statement]:
     """Judge section 4.4: the balance of two harmonics, eqs (4.29) to (4.35)."""
-    solution = (
-        "error of the solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to "
-        "the greatest of its coefficients, the most at 10, 25 and 40 rad/s and I4 = 0.5, 1 and 1.5, ours"
-    )
+
+    def solution(coefficients: str) -> str:
+        return (
+            f"difference of X0 to Y2 by {coefficients} from those by our own balance of two harmonics of (4.29), relative to "
+            "the greatest of them; the greatest difference at 10, 25 and 40 rad/s with I4 = 0.5, 1 and 1.5 (our choice)"
+        )
+
     return [
         Statement(
             "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
             "both sides of equation (4.31) we obtain the [f]ollowing recurrence relationships.",
             text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
-            f"{solution}; without a damper; signs that the scan of (4.32) has lost are those of (4.34)",
+            f"{solution('(4.32)')}; without a damper; signs that the scan of (4.32) has lost are those of (4.34)",
             f"{ROUNDING:g}, above rounding errors",
             (at_most("", ROUNDING, balance_error(0.0)),),
         ),
@@ -392,7 +395,7 @@ def _balance() -> list[Statement]:
             "and equating the coefficients of the trig[o]nometric functions of [theta] on both sides of that equation in a "
             "similar manner to the preceding section, we obtain ... [(4.34)]",
             text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
-            f"{solution}; with omega_c = 1.2 1/s, the greatest of appendix 2",
+            f"{solution('(4.34)')}; with omega_c = 1.2 1/s, the greatest of appendix 2",
             f"{ROUNDING:g}, above rounding errors",
             (at_most("", ROUNDING, balance_error(1.2)),),
             "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",

@@ -193,7 +193,7 @@ def judge_qualities(timed: Quality, path: Quality, found: Quality) -> tuple[Stat
             "generation into consideration.",
             text("6.2.2, L4243"),
             "error in time (6.6) and area of the linkage that is best for their sum, within the same limits",
-            "at most the errors that the thesis states for linkages found for one of them, and calls favourable (L4864) "
+            "at most the errors that the thesis states for linkages found for one of the two, and calls favourable (L4864) "
             "and tolerable (L5043)",
             (
                 at_most("error in time, as at Fig 6.4", str(TIMED.error), found.timed, "cm2"),
@@ -215,9 +215,10 @@ def judge_qualities(timed: Quality, path: Quality, found: Quality) -> tuple[Stat
             "(b) [the constraint (6.14)] is a straightforward evaluation of a constant relation and it is clearly "
             "preferable.",
             text("6.3.2, L4541-4549"),
-            "of the same four-bars: the number that close at the first of the 72 crank angles but not at all of them; the "
-            "number for which (6.14) and these angles disagree; values of C that (b) takes over those of (a)",
-            "one, enough for *may be*; none of a count; at most 1, since (b) is preferable",
+            "of the same four-bars, the number that close at the first of the 72 crank angles but not at all of them, and the "
+            "number for which (6.14) and these angles disagree. Then the number of values of C that (b) needs, divided by the "
+            "number that (a) needs",
+            "one is enough for *may be*; none for a disagreement; at most 1, since (b) is called preferable",
             (
                 at_least("violated at later stages", 1.0, count_late_violations()),
                 near("(6.14) disagrees", 0.0, count_wrong_extremes(), 0.0),

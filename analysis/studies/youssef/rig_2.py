@@ -261,10 +261,10 @@ def _beyond_resonance() -> tuple[Statement, ...]:
             "friction in the guide and pin joints and to the fact that only an average value of the damping is considered "
             "in the theory.",
             text(f"{section}, L6853"),
-            "amplitude and width of the sentence before by the full equations, with one factor over those without it, the "
-            f"least of both springs: friction by {rigs.SLIGHT:g} of the guide's force, a friction radius of "
-            f"{1e3 * PIN_RADIUS:g} mm in the pins, a damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as "
-            "strong (all ours)",
+            "amplitude and width of the sentence before, by the full equations with one factor, divided by those without it; "
+            f"the least ratio of both springs. The factors (our sizes): friction by {rigs.SLIGHT:g} of the guide's force, a "
+            f"friction radius of {1e3 * PIN_RADIUS:g} mm in the pins, a damper "
+            f"{' or '.join(f'{d:g}' for d in DAMPERS)} times as strong",
             larger,
             _factors(),
             "no one factor does both",
@@ -444,7 +444,7 @@ def compute_harmonics() -> StudyResult:
                 "equation, corrected. What the experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", _greatest(s, 1) / _greatest(s, 2), ABOUT * 50.0) for s in "CD"),
-                "the equation as printed cannot be solved, because the scan garbles terms of (4.21)",
+                "(4.21) as printed cannot be solved for a coupler with mass: the scan garbles its terms",
             ),
         ),
     )

@@ -223,8 +223,9 @@ def _rocker() -> tuple[Statement, ...]:
             "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
             "direct search method 'the simplex' will be considered here.",
             text("7.3.2, L5915-5919"),
-            f"number of equations less that of unknowns: (7.6) for the slider's position at each of {angles} crank angles, as "
-            "read at Fig 6.7, with the error (7.4), as 7.2.2 has it; A0 to B2 and v",
+            "number of equations less that of unknowns: the method takes the error at one crank angle, (7.4), so that (7.6) "
+            f"is an equation for the slider's position at each of the {angles} crank angles that we read at Fig 6.7; the "
+            "unknowns are A0, A1, B1, A2, B2 and v",
             "one more, with which in general no series meets them all",
             (at_least("equations less unknowns", 1.0, angles - unknowns),),
         ),
