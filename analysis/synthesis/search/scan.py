@@ -300,10 +300,26 @@ def _place_shapes(
     else:
         found = _place_paths(normal, limits, shapes, branch)
     if limits.second is None:
-        return found
+        return _drop_unjoined(normal, limits, found) if limits.way is not None else found
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     second = links[:, 4] * found.q[:, 4] / links[:, 2]
     return replace(found, pivot=np.column_stack([second, _second_phase(shapes, found.q[:, 8], limits)]))
+
+
+def _drop_unjoined(normal: Normal, limits: Limits, found: Candidates) -> Candidates:
+    """Return the candidates; the quality is infinite for those whose links cannot be joined between two stations.
+
+    The distance BD is extreme where the crank passes the direction of the ground link.
+    """
+    rotation = normal.rotation[None] if found.rotation is None else found.rotation  # type: ignore[index]
+    begin, end = ((found.q[:, 8] + ends(rotation, axis=1)) / pi for ends in (np.min, np.max))
+    l1, l2, l3, l4 = found.q[:, 2:6].T
+    bad = np.zeros(len(l1), dtype=bool)
+    for odd, reach in ((0.0, l1 - l2), (1.0, l1 + l2)):
+        passed = 2.0 * np.ceil(0.5 * (begin - odd)) + odd <= end
+        for excess in limits.linkage.transmission_excess(l3, l4, reach**2, reach**2, cos(TURNING)):
+            bad |= passed & (excess > 0.0)
+    return replace(found, quality=np.where(bad, inf, found.quality))
 
 
 def _directions(
