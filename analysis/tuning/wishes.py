@@ -369,7 +369,9 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
     for change in changes:
         require_variable(*operation, change.name)
         if change.name == over:
-            raise ParameterError(f"change.{over}", over, "not be changed, because it is the quantity whose range is given")
+            raise ParameterError(
+                f"change.{over}", over, "not be changed, because it is the quantity whose range is given"
+            )
     return changes
 
 

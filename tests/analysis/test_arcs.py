@@ -82,6 +82,15 @@ def test_a_curve_that_was_followed_from_both_ends_is_one_motion() -> None:
     assert fold_jumps([curve, hysteresis(433)]) == fold_jumps([curve])
 
 
+@pytest.mark.parametrize("greatest", [5.0, 50.0])
+def test_a_resonance_without_damping(greatest: float) -> None:
+    """The curve from either side ends where its amplitude is ``greatest`` times the scale."""
+    away = np.geomspace(1.0 / greatest, 10.0, 100)
+    ranges = found(branch(100.0 - away[::-1], 1.0 / away[::-1], 0.9), branch(100.0 + away, 1.0 / away, 0.9))
+    risk = Risk.UNBOUNDED if greatest > 10.0 else Risk.UNSTABLE
+    assert ranges[risk] == [pytest.approx((100.0 - 1.0 / greatest, 100.0 + 1.0 / greatest))]
+
+
 def test_doubled_motions_and_none() -> None:
     unstable = (X > 98.0) & (X < 102.0)
     doublings = [

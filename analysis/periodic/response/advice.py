@@ -37,6 +37,8 @@ _SAME, _NOISE = 1e-2, 1e-7
 #: Relative rounding error of the parameter; share of the range below which an interval does not count: such a short interval
 #: arises because a doubled branch begins a step beyond its doubling.
 _ROUNDING, _SLIVER = 1e-6, 1e-4
+#: Amplitude, relative to the scale, at the end of a branch beyond which nothing limits a resonance.
+_UNBOUNDED = 10.0
 FloatArray = NDArray[np.float64]
 Interval = tuple[float, float]
 
@@ -46,6 +48,7 @@ class Risk(Enum):
 
     RESONANCE = "resonance, above 0.71 of the peak"
     SEVERAL = "several stable motions, jumps between them"
+    UNBOUNDED = "resonance that no damping limits"
     DOUBLED = "stable only with a period of several turns"
     UNSTABLE = "no stable motion found"
 
@@ -268,8 +271,10 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
             (_overlap(a, b) for a, b in combinations(stable, 2) if not a.is_same_curve(b)), least
         ),
         (Risk.DOUBLED, ""): doubled,
-        (Risk.UNSTABLE, ""): [part for gap in without for part in _gaps(several, *gap)],
     }
+    for part in (part for gap in without for part in _gaps(several, *gap)):
+        unbounded = any(_grows_towards(arc, *part) for arc in stable if arc.turns == 1)
+        found.setdefault((Risk.UNBOUNDED if unbounded else Risk.UNSTABLE, ""), []).append(part)
     swings = branches[0].orbits[0].swings
     for n, (name, _) in enumerate(swings):
         bands = (band for arc in stable for band in _resonances(arc, n))
@@ -286,6 +291,13 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
 def _overlap(a: Arc, b: Arc) -> Interval:
     """Return the range of the parameter in which two arcs overlap; if they do not overlap, its end lies below its beginning."""
     return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
+
+
+def _grows_towards(arc: Arc, low: float, high: float) -> bool:
+    """Return whether an arc ends at ``low``, or begins at ``high``, because its amplitude grows beyond all links."""
+    size = np.abs(arc.amplitudes / arc.scale[: arc.amplitudes.shape[1]]).max(axis=1)
+    ends = [(arc.cut[0], arc.span[0] == high, size[0]), (arc.cut[1], arc.span[1] == low, size[-1])]
+    return any(meets and not cut and last == size.max() > _UNBOUNDED for cut, meets, last in ends)
 
 
 def _resonances(arc: Arc, coordinate: int) -> list[Interval]:
