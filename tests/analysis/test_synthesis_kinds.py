@@ -16,7 +16,7 @@ from scipy.optimize import brentq, differential_evolution, fsolve
 import analysis.synthesis as syn
 from analysis.mechanisms import SLIDER_CRANK
 from analysis.synthesis.linkage.kernels import COLUMNS, coupler_path_jacobian
-from analysis.synthesis.result.report import report
+from analysis.synthesis.result.report import format_dimension, report
 from analysis.synthesis.search.scan import scan
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.limits import limits_by_kind
@@ -212,6 +212,13 @@ class TestQuickSwing:
         phi = syn.turn(36)
         for branch in (1, -1):
             np.testing.assert_allclose(right[branch].rocker_angle(-phi), -left[-branch].rocker_angle(phi), atol=1e-9)
+
+    def test_zeros_of_the_report_are_zeros(self) -> None:
+        """In a dead centre the crank's phase moves nothing; a shaft on the guide has no height, nor a negative one."""
+        swing = syn.assess(syn.synthesize(syn.QuickSwing(swing="-50 deg", time_ratio=1.2), constraints=[]).best)
+        moved = {row[0]: row[3] for row in swing.dimensions}
+        assert moved["crank_phase"] == "0 deg"
+        assert format_dimension("pivot_y", -0.0) == "0 mm"
 
     def test_size_and_what_cannot_be_had(self) -> None:
         task = syn.QuickSwing(swing="-60 deg", time_ratio=1.1)

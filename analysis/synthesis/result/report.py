@@ -577,7 +577,8 @@ def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str
         off = ANGLE_STEP if s.name in (*ANGLES, *PIVOT_ANGLES) else step
         cost = factor * max(dear[s.name], 0.0)
         grown = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
-        moved = f"{scale * off * s.shift:.3g} {length}"
+        shift = scale * off * s.shift
+        moved = f"{shift if shift >= ROUNDING else 0.0:.3g} {length}"
         rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, grown))
     return rows
 
