@@ -27,7 +27,15 @@ from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide,
 from analysis.linkages.parameters import spring_angle_name
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
-from analysis.periodic import Drive, find_orbit, frequency_response, newton_orbit, search_orbits, steady_drive
+from analysis.periodic import (
+    Drive,
+    largest_multipliers,
+    find_orbit,
+    frequency_response,
+    newton_orbit,
+    search_orbits,
+    steady_drive,
+)
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from analysis.tuning import Wish, tune
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -900,6 +908,47 @@ def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
     drive = steady_drive(made.first_set, Inputs(motor_speed=2.0 * math.pi, pump_torque=-5.0))
     assert not drive.ratios
     assert newton_orbit(made.first_set.parameters, drive).start[0] == pytest.approx(-5.0 / 50.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("stop", [2e4, 2e7])
+def test_periodic_motions_of_a_frame_that_strikes_a_stop(stop: float) -> None:
+    """A spring and a stop at 2 mm, as stiff as the spring or a thousand times; turn and multipliers by SciPy, with events."""
+    built = linkage("striker", ground={"O": (0, 0)}).body("frame", points={"M": (0, 0)}, mass=20)
+    built.body("rotor", points={"M": (0, 0)}, mass=1, cog=("30 mm", 0), inertia=0.01).slide(
+        "X", body="frame", through="O"
+    )
+    built.spring("leaf", at="X", stiffness="20 N/mm", damping="60 N*s/m")
+    built.spring("stop", at="X", law="k*max(x - 0.002, 0)", constants={"k": stop})
+    made = built.freedom("rotor", "M", speed="300 rpm").freedom("x", "X").mechanism()
+    speed, drive = 10.0 * math.pi, Drive(speed=10.0 * math.pi)
+    orbit = newton_orbit(made.first_set.parameters, drive)
+
+    def turned(y: Any) -> Any:
+        t, end = 0.0, 2.0 * math.pi / speed
+        while t < end:
+            stiffness = 2e4 + stop * (y[0] > 0.002 or (y[0] == 0.002 and y[1] > 0.0))
+
+            def rates(t: float, y: Any, k: float = stiffness) -> Any:
+                force = 0.03 * speed**2 * math.cos(speed * t) - k * y[0] + (k - 2e4) * 0.002 - 60.0 * y[1]
+                return y[1], force / 21.0
+
+            def meets(t: float, y: Any) -> float:
+                return float(y[0] - 0.002)
+
+            meets.terminal = True  # type: ignore[attr-defined]
+            part = integrate.solve_ivp(rates, (t, end), y, "DOP853", rtol=1e-12, atol=1e-14, events=meets)
+            t, y = part.t[-1], part.y[:, -1]
+            if part.status == 1:
+                y[0] = np.nextafter(0.002, math.copysign(1.0, y[1]))
+        return y
+
+    np.testing.assert_allclose(turned(orbit.start), orbit.start, rtol=1e-6)
+    step = 1e-6 * np.diag([1e-2, 1.0])
+    columns = [(turned(orbit.start + d) - turned(orbit.start - d)) / (2.0 * d.sum()) for d in step]
+    values = np.sort_complex(np.linalg.eigvals(np.column_stack(columns)))
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), values, atol=1e-4)
+    charted = largest_multipliers([made.first_set.parameters] * 3, [drive] * 3, orbit.start)[0]
+    np.testing.assert_allclose(charted, abs(values).max(), rtol=1e-4)
 
 
 def shaker(name: str) -> Any:

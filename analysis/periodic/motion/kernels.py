@@ -31,6 +31,7 @@ from ...run.stepping import (
     attempt,
     interpolant,
     interpolate,
+    leading_error,
     next_step_size,
     shorter_step_size,
     stage,
@@ -58,7 +59,9 @@ REASONS = {
     Status.DIVERGED: "Newton's method does not converge",
 }
 #: Least step of the integrator (rad).
-LEAST_STEP = 1e-9
+LEAST_STEP = 1e-12
+#: Greatest error of the columns of derivatives, relative to the tolerance, in a step across a kink.
+_KINK = 1e6
 #: Crank speed below which the crank counts as stalled, relative to its speed at the start.
 STALL = 1e-3
 #: Least fraction of a Newton correction that is tried: in Newton's method, and in the search for other motions.
@@ -118,6 +121,19 @@ def _clearance(section, angle, z, room):
 
 
 @inner
+def passes_kink(section, error, h, z, y, k, sizes, tolerance, lane, lanes):
+    """Return whether the least step may be taken from z to y although its error is too large.
+
+    Where the force of a law has a kink, as at a stop, the rates of the columns of derivatives jump: their error falls in
+    proportion to the step only. The state itself must be accurate. ``error`` is relative to the tolerance.
+    """
+    n = section.scale.shape[0]
+    if not error < _KINK or z.shape[0] == n * lanes:
+        return False
+    return leading_error(n, z, y, k, h, sizes, lane, lanes) <= tolerance
+
+
+@inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
     """Take one step from z, shortened until its error is accepted; return the status and the new crank angle.
 
@@ -138,6 +154,8 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
         # beyond the limit of assembly the error is NaN
         proposed = shorter_step_size(h, error)
         if proposed < LEAST_STEP:
+            if passes_kink(section, error, h, z, room.y, room.k, room.sizes, section.tolerance, 0, 1):
+                break
             return (LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP), angle
     carry[0] = next_step_size(h, proposed, error)
     angle = end if last else angle + h

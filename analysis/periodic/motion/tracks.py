@@ -20,7 +20,7 @@ from ...run.compiled import write_lane
 from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
-from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
+from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, passes_kink, start_piece
 
 #: Status of a lane whose motion has not ended, and of a lane without a motion; a motion ends with a `Status`.
 RUNNING, IDLE = -1, -2
@@ -152,9 +152,11 @@ def _judge(lane, section, last, v):
     if not error <= 1.0:
         # beyond the limit of assembly the error is NaN
         v.step[lane] = shorter_step_size(h, error)
-        if v.step[lane] < LEAST_STEP:
+        if v.step[lane] >= LEAST_STEP:
+            return False
+        if not passes_kink(section, error, h, v.x, v.y, v.k, v.sizes, v.tolerance[lane], lane, LANES):
             v.status[lane] = LIMIT if v.before[lane] < NEAR_LIMIT else NO_STEP
-        return v.status[lane] != RUNNING
+            return True
     v.step[lane] = next_step_size(h, v.step[lane], error)
     v.angle[lane] = v.end[lane] if last else v.angle[lane] + h
     v.before[lane] = v.gap[lane]
