@@ -29,9 +29,9 @@ from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.periodic import (
     Drive,
-    largest_multipliers,
     find_orbit,
     frequency_response,
+    largest_multipliers,
     newton_orbit,
     search_orbits,
     steady_drive,
