@@ -45,8 +45,9 @@ ITERATIONS, FOUND = 12, 1e-9
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a motion counts as lost.
 _HALVINGS = 3
-#: Number of samples of a common period.
-_SAMPLES = 256
+#: Least and greatest number of samples of a common period, and size of the highest harmonics, relative to the greatest, above
+#: which there are more samples.
+_SAMPLES, _UNRESOLVED = (256, 8192), 1e-5
 
 
 class LostError(LinkworkError):
@@ -112,9 +113,19 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     return orbit
 
 
-def sample_turn(orbit: PeriodicOrbit) -> Turn:
-    """Return the outputs over the period, with `_SAMPLES` samples for each common period."""
-    return orbit.turn(_SAMPLES * orbit.periods)
+def sample_turn(orbit: PeriodicOrbit, limit: Limit) -> Turn:
+    """Return the outputs over the period, with as many samples as the series of what is limited needs, within `_SAMPLES`."""
+    least, most = (samples * orbit.periods for samples in _SAMPLES)
+    turn = orbit.turn(least)
+    while len(turn.angle) < most and not all(_is_resolved(turn.oscillation(part)) for part in limit.parts):
+        turn = orbit.turn(2 * len(turn.angle))
+    return turn
+
+
+def _is_resolved(samples: FloatArray) -> bool:
+    """Return whether the highest harmonics of samples over a period are negligible; they are not where a stop is struck."""
+    size = np.abs(np.fft.rfft(samples))
+    return bool(size[3 * len(size) // 4 :].max() <= _UNRESOLVED * size.max())
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:
@@ -511,7 +522,7 @@ class OutputBelow:
         # the error of the top of a parabola is proportional to the square of its width
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
-        turn = sample_turn(found.orbit)
+        turn = sample_turn(found.orbit, self.limit)
         self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
@@ -537,7 +548,7 @@ class OutputBelow:
 
     def _reading(self, x: FloatArray, level: float) -> tuple[PickedMotion, float]:
         found = TrackedMotion(self._wish, CrossPlane.level_plane(self._wish, self._last, level), self._last).find(x)
-        turn = sample_turn(found.orbit)
+        turn = sample_turn(found.orbit, self.limit)
         return found, value_at_angles(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:

@@ -421,7 +421,7 @@ def _output_maxima(
     """Yield the local maxima of an output over the levels of the range, refined between the levels of the given motions."""
     found = []
     for branch in motions:
-        values = [limited_value(sample_turn(orbit), limit)[0] for _, orbit in branch]
+        values = [limited_value(sample_turn(orbit, limit), limit)[0] for _, orbit in branch]
         for i, value in enumerate(values):
             if value >= max(values[max(i - 1, 0) : i + 2]):
                 found.append((value, branch[i][1]))
@@ -441,7 +441,7 @@ def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
             there = TrackedMotion(wish, CrossPlane.level_plane(wish, near, level), near).find(near.x)
         except LostError:
             return 0.0  # beyond a fold
-        size, angles = limited_value(sample_turn(there.orbit), limit)
+        size, angles = limited_value(sample_turn(there.orbit, limit), limit)
         found.append(OutputMaximum(limit=limit, value=size, spot=there.spot, angles=angles))
         return -size
 

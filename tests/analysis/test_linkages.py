@@ -37,7 +37,8 @@ from analysis.periodic import (
     steady_drive,
 )
 from analysis.run import Inputs, Trajectory, load_case, simulate
-from analysis.tuning import Wish, tune
+from analysis.tuning import Limit, Wish, tune
+from analysis.tuning.conditions import limited_value, sample_turn
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
@@ -910,16 +911,21 @@ def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
     assert newton_orbit(made.first_set.parameters, drive).start[0] == pytest.approx(-5.0 / 50.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("stop", [2e4, 2e7])
-def test_periodic_motions_of_a_frame_that_strikes_a_stop(stop: float) -> None:
-    """A spring and a stop at 2 mm, as stiff as the spring or a thousand times; turn and multipliers by SciPy, with events."""
+def striker(stop: float) -> Any:
+    """A rotor shakes a frame on a spring, which has a stop of a given stiffness at 2 mm."""
     built = linkage("striker", ground={"O": (0, 0)}).body("frame", points={"M": (0, 0)}, mass=20)
     built.body("rotor", points={"M": (0, 0)}, mass=1, cog=("30 mm", 0), inertia=0.01).slide(
         "X", body="frame", through="O"
     )
     built.spring("leaf", at="X", stiffness="20 N/mm", damping="60 N*s/m")
     built.spring("stop", at="X", law="k*max(x - 0.002, 0)", constants={"k": stop})
-    made = built.freedom("rotor", "M", speed="300 rpm").freedom("x", "X").mechanism()
+    return built.freedom("rotor", "M", speed="300 rpm").freedom("x", "X").mechanism()
+
+
+@pytest.mark.parametrize("stop", [2e4, 2e7])
+def test_periodic_motions_of_a_frame_that_strikes_a_stop(stop: float) -> None:
+    """A stop as stiff as the spring, or a thousand times; a turn and its multipliers by SciPy, with events."""
+    made = striker(stop)
     speed, drive = 10.0 * math.pi, Drive(speed=10.0 * math.pi)
     orbit = newton_orbit(made.first_set.parameters, drive)
 
@@ -949,6 +955,21 @@ def test_periodic_motions_of_a_frame_that_strikes_a_stop(stop: float) -> None:
     np.testing.assert_allclose(np.sort_complex(orbit.multipliers), values, atol=1e-4)
     charted = largest_multipliers([made.first_set.parameters] * 3, [drive] * 3, orbit.start)[0]
     np.testing.assert_allclose(charted, abs(values).max(), rtol=1e-4)
+
+
+def test_the_greatest_force_of_a_stop_is_found_between_the_samples() -> None:
+    known = striker(2e7).first_set
+    wish = Wish(
+        parameters=known.parameters,
+        speeds=(30.0, 32.0),
+        change={"leaf.damping": "5 %"},
+        limits=[Limit(output="stop.exerted_force", below="2 kN")],
+    )
+    orbit = newton_orbit(known.parameters, Drive(speed=10.0 * math.pi))
+    value, _ = limited_value(sample_turn(orbit, wish.limits[0]), wish.limits[0])
+    start = {"x_position": orbit.start[0], "x_velocity": orbit.start[1]}
+    run = simulate(known.parameters, Inputs(speed=10.0 * math.pi), initial=start, stop_time=0.2, step=1e-5)
+    assert value == pytest.approx(run["stop.exerted_force"].max(), rel=1e-4)
 
 
 def shaker(name: str) -> Any:
