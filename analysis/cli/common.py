@@ -390,13 +390,18 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
     return values
 
 
-def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """Return the case of a file or of a published set, with the changes by ``--set``; print warnings about its masses."""
+def chosen_case(file: str | None, published: str | None, settings: Sequence[str], *, runs: bool = True) -> Any:
+    """Return the case of a file or of a published set, with the changes by ``--set``; print warnings about its masses.
+
+    If nothing ``runs``, the case need not say how long.
+    """
     from ..run import describe_masses, load_case, published_case, read_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
     overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
+    if not runs and (file or overrides) and "run.revolutions" not in overrides:
+        overrides = {"run.stop_time": 1.0} | overrides
     if file is not None:
         check_kind(file, RUN, PARAMETERS)
         case = load_case(file, overrides)

@@ -104,7 +104,7 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
         out: str,
         **options: Any,
     ) -> None:
-        chosen = common.chosen_case(case, published, settings)
+        chosen = common.chosen_case(case, published, settings, runs=False)
         stem = Path(case).stem if case else str(published)
         command(CaseChoice(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 

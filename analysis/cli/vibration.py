@@ -490,7 +490,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begi
     rpm = drive.speed / RAD_S_PER_RPM if drive.speed_drive else 60.0 * turn.turns / turn.period
     lines = [
         f"{title} at {rpm:.6g} rpm: {orbit.verdict()}",
-        f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
+        f"Floquet multipliers {values}; amplitude {size * orbit.amplitude:.5g} {unit}",
     ]
     if orbit.others:
         others = format_count(orbit.others, "other periodic motion")

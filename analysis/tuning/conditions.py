@@ -45,9 +45,8 @@ ITERATIONS, FOUND = 12, 1e-9
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a motion counts as lost.
 _HALVINGS = 3
-#: Least and greatest number of samples of a common period, and size of the highest harmonics, relative to the greatest, above
-#: which there are more samples.
-_SAMPLES, _UNRESOLVED = (256, 8192), 1e-5
+#: Number of samples of a common period.
+_SAMPLES = 256
 
 
 class LostError(LinkworkError):
@@ -114,18 +113,8 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
 
 
 def sample_turn(orbit: PeriodicOrbit, limit: Limit) -> Turn:
-    """Return the outputs over the period, with as many samples as the series of what is limited needs, within `_SAMPLES`."""
-    least, most = (samples * orbit.periods for samples in _SAMPLES)
-    turn = orbit.turn(least)
-    while len(turn.angle) < most and not all(_is_resolved(turn.oscillation(part)) for part in limit.parts):
-        turn = orbit.turn(2 * len(turn.angle))
-    return turn
-
-
-def _is_resolved(samples: FloatArray) -> bool:
-    """Return whether the highest harmonics of samples over a period are negligible; they are not where a stop is struck."""
-    size = np.abs(np.fft.rfft(samples))
-    return bool(size[3 * len(size) // 4 :].max() <= _UNRESOLVED * size.max())
+    """Return the outputs over the period, with `_SAMPLES` samples for each common period, or as many as the limit needs."""
+    return orbit.resolved_turn(limit.parts, _SAMPLES * orbit.periods)
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:

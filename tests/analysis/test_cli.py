@@ -503,8 +503,7 @@ def test_a_motor_is_no_input_that_varies_in_time(linkwork):
 @pytest.mark.slow
 def test_resonance_over_the_torque(linkwork):
     result = linkwork(
-        "resonance", "--published", "rig-2-spring-c", "--set", "drive.torque=0.01 N*m",
-        "--set", "run.stop_time=1 s", "--vary", "drive.torque",
+        "resonance", "--published", "rig-2-spring-c", "--set", "drive.torque=0.01 N*m", "--vary", "drive.torque",
         "--from", "0.005", "--to", "0.06", "--guess-speed", "540 rpm", "--no-plot", "--doublings", "0",
     )  # fmt: skip
     assert "fold at 0.04949" in result.output, result.output

@@ -972,6 +972,16 @@ def test_the_greatest_force_of_a_stop_is_found_between_the_samples() -> None:
     assert value == pytest.approx(run["stop.exerted_force"].max(), rel=1e-4)
 
 
+def test_the_amplitude_of_a_flywheel_that_a_press_slows_down_suddenly() -> None:
+    built = linkage("pressing", ground={"A": (0, 0)}).body("wheel", points={"A": (0, 0)}, mass=30, inertia=12)
+    built.spring("load", at="A", law="20*v - 250 + 40*sin(x) + 3e4*max(sin(x) - 0.98, 0)")
+    parameters = built.freedom("wheel", "A", driven=True).mechanism().first_set.parameters
+    orbit = find_orbit(parameters, torque=0.0, start=[12.0])
+    inputs, start = Inputs(torque=0.0), {"wheel_speed": orbit.start[0]}
+    run = simulate(parameters, inputs, initial=start, stop_time=orbit.turn().period, step=1e-4, tolerance=1e-11)
+    assert orbit.amplitude == pytest.approx(0.5 * np.ptp(run["wheel.speed"]), rel=2e-4)
+
+
 def shaker(name: str) -> Any:
     """An unbalanced crank on a sprung frame that moves along x, with the law of a motor; natural frequency 302 rpm."""
     built = linkage(name, ground={"O": (0, 0)}).body("frame", points={"A": (0, 0)}, mass=10)

@@ -334,7 +334,6 @@ def test_the_motions_of_an_isola_are_found_and_followed_until_they_close() -> No
 def test_the_command_line_says_which_motions_are_closed(linkwork: Callable[..., Result]) -> None:
     settings = [("damping", 0.05), ("cubic_stiffness", 0.2), ("modulation", 0.8), ("excitation", 0.02)]
     about = ["--published", "torsion-demo", *(word for name, v in settings for word in ("--set", f"rotor.{name}={v}"))]
-    about += ["--set", "run.stop_time=1"]
     ends = ["--from", "0.9 rad/s", "--to", "1.4 rad/s", "--doublings", "0", "--places", "1", "--no-plot"]
     result = linkwork("resonance", *about, *ends)
     assert result.exit_code == 0, result.output

@@ -8,6 +8,7 @@ Unstable motions are found as easily as stable motions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
@@ -62,6 +63,9 @@ MOST_ITERATIONS = 40
 SETTLING_TURNS, SETTLED = 200, 1e-4
 #: Samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
+#: Greatest number of samples of a common period where a motion is sharp, as at a stop, and size of the highest harmonics,
+#: relative to the greatest harmonic, above which there are more samples.
+_MOST_SAMPLES, _SHARP = 8192, 1e-5
 #: Error of an amplitude, relative to the scale of the coordinate: a little more than that of the orbits.
 _ROUNDING = 10.0 * ORBIT_TOLERANCE
 #: Outputs that an orbit does not have: they count from the start of a run.
@@ -183,6 +187,12 @@ class Turn:
                 f"multiples of 1/{self.turns} up to {(len(self.angle) - 1) // 2 / self.turns:g}"
             )
         return 2.0 * float(np.abs(np.fft.rfft(self.oscillation(name))[int(number)])) / len(self.angle)
+
+
+def _is_sharp(samples: FloatArray) -> bool:
+    """Return whether the highest harmonics of samples over a period are not negligible."""
+    size = np.abs(np.fft.rfft(samples))[1:]
+    return bool(size[3 * len(size) // 4 :].max() > _SHARP * size.max())
 
 
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
@@ -370,6 +380,13 @@ class PeriodicOrbit(NotebookResult):
             angles=frozenset(v.name for v in mechanism.variables if v.unit == "rad"),
         )
 
+    def resolved_turn(self, outputs: Sequence[str], samples: int = SAMPLES) -> Turn:
+        """Return the outputs as `turn` does, with as many samples as the Fourier series of the named outputs need."""
+        turn, most = self.turn(samples), _MOST_SAMPLES * self.periods
+        while len(turn.angle) < most and any(_is_sharp(turn.oscillation(name)) for name in outputs):
+            turn = self.turn(2 * len(turn.angle))
+        return turn
+
     @property
     def amplitude(self) -> float:
         """Half the range of the first free coordinate over a period, such as a slider position (m)."""
@@ -379,7 +396,8 @@ class PeriodicOrbit(NotebookResult):
     def amplitudes(self) -> FloatArray:
         """Half the range of each free coordinate over a period, in the order of `swings`; see `Turn.amplitudes`."""
         if "amplitudes" not in self._kept:
-            self._kept["amplitudes"] = self.turn().amplitudes
+            names = [name for name, _ in self.flow.components[: self.flow.swing_count]]
+            self._kept["amplitudes"] = self.resolved_turn(names).amplitudes
         amplitudes: FloatArray = self._kept["amplitudes"]
         return amplitudes
 
