@@ -77,7 +77,8 @@ stiffness = "0.5 N*m/rad"
 free = "90 deg"                           # angle, position or length at which it is free
 damping = "0.01 N*m*s/rad"
 # friction = "0.1 N*m"                    # Coulomb friction, smooth about rest
-# law = "3*x**3"                          # a further force against the stretch x and its rate v, or a table of rows
+# law = "3*x**3"                          # a further force against the stretch x and its rate v, positive where it resists
+#                                         # as 3*x and 2*v do (a motor at a pin is 2*v - 5), or a table of rows
 #                                         # such as ["5 deg", "2 N*m"]
 # constants = {{ a = "3 N*m" }}             # of a law such as "a*x**3": parameters
 # driven = true                           # an input drives it: a cylinder, a linear motor
