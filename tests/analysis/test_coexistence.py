@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,10 @@ from analysis.periodic import (
     with_isolas,
 )
 from analysis.periodic.chart import chart as charts
+from analysis.periodic.chart import kernels
 from analysis.periodic.chart.boundary import line_branches
+from analysis.periodic.chart.grid import grid_points
+from analysis.periodic.chart.kernels import Motions, Points
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import InitialState
@@ -322,3 +326,17 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         f"rig-1-spring-b-basins.{kind}" for kind in ("csv", "html", "png")
     ]
     assert "ends in motion 1" in (tmp_path / "rig-1-spring-b-basins.html").read_text(encoding="utf-8")
+
+
+def test_a_row_of_a_chart_ends_with_its_last_point() -> None:
+    """A mechanism after the last one, here in memory beyond the arrays, is not searched: its spring would take hours."""
+    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.stiffness")
+    _, _, (row,), guesses = grid_points(operation, [SPEED, SPEED], [RIG_1_B.slider_stiffness], None, 16)
+    _, _, (stiff,), _ = grid_points(operation, [SPEED, SPEED], [1e13], None, 16)
+    within = Points(*(np.vstack(each)[:2] for each in zip(row.points(), stiff.points())))
+    section = row.first.section(guesses[0], *coexistences._SEARCHED)
+    found = Motions(np.empty((2, 8, 2)), np.empty((2, 8, 4)), np.empty((2, 8, 1)), np.zeros(2, dtype=np.int64))
+    began = process_time()
+    kernels.solve_all(section, within, row.search(), 2, np.zeros(1), guesses, found)
+    assert found.counts.tolist() == [3, 3]
+    assert process_time() - began < 10.0

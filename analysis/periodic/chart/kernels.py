@@ -419,7 +419,7 @@ def _begin_wave(row, job, seekers, carry):
             seekers.point[row] += 1
             seekers.guessing[row] = False
             for place in range(todo.shape[0]):
-                todo[place] = place < counts[at]
+                todo[place] = place < counts[at] and seekers.point[row] < job.columns
             seekers.begun[row] = 0
         else:
             for place in range(todo.shape[0]):
