@@ -135,9 +135,11 @@ class Variables:
         """Return the default experiment of the FMU: start, stop and step (s), tolerance.
 
         It takes three turns of the slowest crank that turns at the start, about as many as two digits can say, in steps of at
-        most one degree of the fastest crank; 1 s in steps of 1 ms if no crank turns.
+        most one degree of the fastest crank; 1 s in steps of 1 ms if no crank turns. Angles without a drive, such as that of a
+        pendulum on a crank, count only if no other angle moves.
         """
-        turns = [2.0 * pi / abs(d.speed) for d in self.interface.drives if d.unit == "rad" and d.speed]
+        moving = [d for d in self.interface.drives if d.turns and d.speed]
+        turns = [2.0 * pi / abs(d.speed) for d in [d for d in moving if d.table] or moving]
         if not turns:
             return 0.0, 1.0, 1e-3, 1e-9
         power = 10.0 ** floor(log10(min(turns) / 360.0))

@@ -12,6 +12,8 @@ from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, 
 from analysis.linkages import linkage
 from analysis.periodic import (
     Drive,
+    Extremum,
+    Family,
     OrbitError,
     Risk,
     Stability,
@@ -19,6 +21,7 @@ from analysis.periodic import (
     confirm,
     frequency_response,
     newton_orbit,
+    special_gradient,
     sweep,
 )
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
@@ -100,6 +103,18 @@ def test_a_resonance_beside_a_fold_is_found(damping: float) -> None:
     assert (peak.parameter, peak.amplitude) == (pytest.approx(speed, rel=0.06), pytest.approx(ratio * speed, rel=0.06))
     avoided = [a for a in response.speeds_to_avoid if a.risk is Risk.RESONANCE and a.high > 32.0]
     assert [a.high for a in avoided] == [pytest.approx(peak.parameter, rel=1e-4)]
+
+
+def test_a_resonance_at_a_fold_has_a_gradient() -> None:
+    def peak(damping: float) -> tuple[Extremum, Family]:
+        response = frequency_response(variant(duffing(0.1), spring_damping=damping), 10.0, 90.0)
+        return response.maxima()[0], response.family
+
+    top, family = peak(0.75)
+    high, low = peak(0.75075)[0], peak(0.74925)[0]
+    found = special_gradient(family, top, ["spring.damping"])
+    assert found.place.by == pytest.approx([(high.parameter - low.parameter) / 1.5e-3], rel=1e-3)
+    assert found.amplitude.by == pytest.approx([(high.amplitude - low.amplitude) / 1.5e-3], rel=1e-3)
 
 
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])

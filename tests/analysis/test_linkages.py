@@ -662,6 +662,13 @@ def test_the_default_experiment_is_three_turns(tmp_path: Path, speed: str | None
     assert mechanism.experiment == (0.0, pytest.approx(span), pytest.approx(step), 1e-9)
 
 
+def test_a_pendulum_on_the_crank_does_not_prolong_the_default_experiment() -> None:
+    built = linkage("swing", ground={"A": (0, 0)}).body("crank", points={"A": (0, 0), "P": (0.1, 0)}, mass=1)
+    built.body("arm", points={"P": (0, 0)}, mass=1, cog=(0.05, 0))
+    built.freedom("crank", "A", speed="300 rpm").freedom("arm", "P", speed=0.05)
+    assert built.mechanism().experiment[1] == pytest.approx(0.6)
+
+
 def test_the_builder_refuses_a_name_given_twice() -> None:
     with pytest.raises(InputError, match=r"already has springs\.wind"):
         wheel("twice", stiffness=1.0).spring("wind", at="Q", damping=1.0)

@@ -35,6 +35,8 @@ from .variations import Place, Variations
 FloatArray = NDArray[np.float64]
 #: Newton steps to a special point at most, relative size of the last step, and greatest relative distance to the point.
 _STEPS, _LAST, _FAR = 12, 1e-7, 0.25
+#: Distance of a multiplier from +1 below which a motion counts as that at a fold.
+_AT_FOLD = 1e-3
 #: Product of unit left and right eigenvectors below which a multiplier is double and has no derivative.
 _DOUBLE = 1e-6
 
@@ -366,6 +368,8 @@ def extremum_gradient(
 ) -> PointGradient:
     """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
+    An extremum so near to a fold that it is not told from the fold moves with the fold.
+
     Parameters
     ----------
     orbit : PeriodicOrbit
@@ -383,7 +387,12 @@ def extremum_gradient(
         If there is no extremum near the motion.
     """
     others = _other_names(orbit, along, names)
-    motion = MotionGradient(extremum_orbit(orbit, along, coordinate), (*others, along), coordinate)
+    try:
+        motion = MotionGradient(extremum_orbit(orbit, along, coordinate), (*others, along), coordinate)
+    except LinkworkError:
+        if np.abs(orbit.multipliers - 1.0).min() > _AT_FOLD:
+            raise
+        return crossing_gradient(orbit, Crossing.FOLD, along, others, coordinate)
     slopes = motion.amplitude_curvature(along).by
     # at the extremum the amplitude does not change with the parameter ``along``
     amplitude, at = motion.amplitude, motion.values[:-1]
@@ -396,7 +405,7 @@ def extremum_gradient(
 
 
 def crossing_gradient(
-    orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None
+    orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None, coordinate: int = 0
 ) -> PointGradient:
     """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
@@ -413,7 +422,7 @@ def crossing_gradient(
     orbit = _locate_motion(
         orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
     )
-    motion = MotionGradient(orbit, (*others, along))
+    motion = MotionGradient(orbit, (*others, along), coordinate)
     test = _test(motion, kind)
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
         raise LinkworkError(f"the {kind.value} does not move along {along}: its place there has no derivative")
