@@ -19,6 +19,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
+import numpy as np
+from numpy.typing import NDArray
+
 import linkwork
 from linkwork.errors import AssemblyError, IntegrationError
 from linkwork.mechanism import Mechanism
@@ -27,7 +30,7 @@ from linkwork.plant import Plant
 
 from ..mechanisms import MECHANISMS
 from ..numerics.cache import code_folder, load_or_make
-from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler, standard_cases
+from ..run import ALLOWED, EXPERIMENTS, LEAST_SCALE, MANIFEST, STANDARD, Case, input_sampler, standard_cases
 from .bill import BILL, TYPE
 from .description import layered_standard, to_xml_bytes
 
@@ -50,7 +53,8 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     """Return the files of a mechanism's experiments and their manifest, by their paths in the archive.
 
     A mechanism that is not registered or has no cases has only its default experiment. The duration of this experiment is
-    halved until the motion does not reach the limit of assembly and the solver takes at most `LONGEST` steps.
+    halved until the motion does not reach the limit of assembly, the solver takes at most `LONGEST` steps, and a run at the
+    tolerance of the experiment differs from the reference by a quarter of what is allowed at most.
 
     The files of Linkwork's own mechanisms, whose references take many seconds in plain Python, are kept in the cache under a
     hash of all sources of Linkwork.
@@ -80,7 +84,12 @@ def _make_experiments(mechanism: Mechanism) -> dict[str, bytes]:
     ) -> None:
         start, step = mechanism.experiment[0], (end - mechanism.experiment[0]) / STEPS
         times = [start + n * step for n in range(STEPS + 1)]
-        stimuli, reference = _reference(mechanism, values, times, inputs, longest)
+        stimuli, reference = _reference(mechanism, values, times, inputs, REFERENCE, longest)
+        if longest < inf:
+            _, found = _reference(mechanism, values, times, inputs, TOLERANCE, longest)
+            apart = _deviations(mechanism, found, reference) > 0.25 * DIFFERENCE
+            if apart.any():
+                raise _TooLongError(reference[int(apart.argmax())][0])
         node = SubElement(root, "Experiment", {"name": name, "description": title, "tolerance": repr(TOLERANCE)})
         span = {"startTime": start, "stopTime": end, "stepSize": step}
         SubElement(node, "TransientSimulation", {key: repr(value) for key, value in span.items()})
@@ -159,14 +168,19 @@ def _result_indices(mechanism: Mechanism) -> list[int]:
 
 
 class _TooLongError(Exception):
-    """The solver of the plant has already taken too many steps at a ``time`` (s) before the end."""
+    """At a ``time`` (s) the solver of the plant has taken too many steps, or the result depends too much on its tolerance."""
 
     def __init__(self, time: float) -> None:
         self.time = time
 
 
 def _reference(
-    mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs, longest: float
+    mechanism: Mechanism,
+    values: Mapping[str, Any],
+    times: Sequence[float],
+    inputs: _Inputs,
+    tolerance: float,
+    longest: float,
 ) -> tuple[list[list[float]], list[list[float]]]:
     """Return the rows of inputs for all ``times``, and rows of results at the start and at `ROWS` later times.
 
@@ -179,7 +193,7 @@ def _reference(
 
     first = rounded_inputs(0, None)
     starts = {v.name: v.start for v in mechanism.variables}
-    plant = Plant.from_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
+    plant = Plant.from_values(mechanism, {**starts, **values, **first}, tolerance=tolerance, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
     outputs = list(plant.outputs())
     places = _result_indices(mechanism)
@@ -200,13 +214,29 @@ def _reference(
     return stimuli, _round_results(mechanism, rows)
 
 
+def _result_units(mechanism: Mechanism) -> list[str]:
+    """Return the units of the results."""
+    units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
+    return [units[place] for place in _result_indices(mechanism)]
+
+
+def _deviations(mechanism: Mechanism, found: list[list[float]], reference: list[list[float]]) -> NDArray[np.float64]:
+    """Return for each row of results the largest relative difference from a reference, as `analysis.run.verify` measures it."""
+    units, wanted = np.array(_result_units(mechanism)), np.array(reference)[:, 1:]
+    sizes = np.abs(wanted).max(axis=0)
+    scale = np.maximum(sizes, LEAST_SCALE * np.array([sizes[units == unit].max() for unit in units]))
+    largest: NDArray[np.float64] = (np.abs(np.array(found)[:, 1:] - wanted) / np.where(scale > 0.0, scale, 1.0)).max(
+        axis=1
+    )
+    return largest
+
+
 def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
     """Round results, so that another C library gives the same texts.
 
     In each unit the largest result gets `DIGITS` significant digits, all others as many decimal places as this result.
     """
-    units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
-    units = ["", *(units[place] for place in _result_indices(mechanism))]
+    units = ["", *_result_units(mechanism)]
     largest: dict[str, float] = {}
     for unit, column in zip(units, zip(*rows)):
         largest[unit] = max(*map(abs, column), largest.get(unit, 0.0))

@@ -38,7 +38,7 @@ ALLOWED = "org.linkwork.allowed"
 #: Without that annotation: factor of the tolerance, and least value of their product; allowed difference without a tolerance.
 _FACTOR, _LEAST_ALLOWED, _DEFAULT_ALLOWED = 100.0, 1e-6, 1e-3
 #: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
-_LEAST_SCALE = 1e-3
+LEAST_SCALE = 1e-3
 
 
 class ExperimentError(LinkworkError):
@@ -361,7 +361,7 @@ def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str
         difference = np.abs(values - reference[name])
         difference[np.isnan(difference)] = np.inf
         worst = int(np.argmax(difference))
-        scale = max(sizes[name], _LEAST_SCALE * of_unit[units[name]]) or 1.0
+        scale = max(sizes[name], LEAST_SCALE * of_unit[units[name]]) or 1.0
         deviations.append(
             Deviation(
                 name=name,
