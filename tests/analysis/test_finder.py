@@ -65,13 +65,13 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
 
 
-def duffing(length: float) -> str:
+def duffing(length: float, law: str = "2.5e6*x**3") -> str:
     """Describe an unbalanced rotor on a sprung carriage, Duffing's equation, with bodies of any length; return its name."""
     built = linkage(f"duffing-{length:.0f}", ground={"A": (0, 0)})
     built.body("carriage", points={"P": (0, 0), "C": (0, 0), "Q": (length, 0)}, mass=1.0)
     built.slide("guide", body="carriage", on="ground", through="A", direction=0)
     built.body("rotor", points={"C": (0, 0), "R": (length, 0)}, mass=0.05, cog=(0.01, 0), inertia=1e-4)
-    built.spring("spring", at="guide", stiffness=900.0, damping=1.0, law="2.5e6*x**3")
+    built.spring("spring", at="guide", stiffness=900.0, damping=1.0, law=law)
     return built.freedom("carriage", "guide").freedom("rotor", "C", speed=36.0).mechanism().name
 
 
@@ -83,6 +83,17 @@ def test_motions_much_smaller_than_the_bodies_are_found(length: float) -> None:
     squares = np.roots([bend**2, 2.0 * rest * bend, rest**2 + damping**2, -(force**2)])
     found = find_orbits(duffing(length), speed=speed)
     assert [orbit.amplitude for orbit in found.orbits] == pytest.approx(sorted(np.sqrt(squares.real)), rel=0.01)
+
+
+def test_doubled_branches_do_not_depend_on_the_length_of_the_bodies() -> None:
+    found = []
+    for length in (0.02, 2.0):
+        rig = variant(duffing(length, "8e4*x**2 + 2.5e6*x**3"), spring_damping=0.5)
+        response = frequency_response(rig, 45.0, 75.0, doublings=1)
+        assert [branch.turns for branch in response.branches] == [1, 2]
+        found.append([(a.risk, pytest.approx((a.low, a.high), abs=1e-4)) for a in response.speeds_to_avoid])
+    assert [risk for risk, _ in found[0]] == [Risk.SEVERAL, Risk.DOUBLED]
+    assert [(a.risk, (a.low, a.high)) for a in response.speeds_to_avoid] == found[0]
 
 
 def test_basins_do_not_depend_on_the_length_of_the_bodies() -> None:

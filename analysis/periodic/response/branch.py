@@ -286,6 +286,7 @@ def switch(
         orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
     )
     follower = _follower(family, begun, settings)
+    follower.scale[:-1] *= _sizes([orbit])
     # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy - (-1.0) ** (times - 1) * np.eye(len(scale))) * scale / scale[:, None]
@@ -296,10 +297,22 @@ def switch(
         if taken is None:
             continue
         away = (np.append(taken.y, taken.parameter) - np.append(orbit.start, special.parameter)) / follower.scale
-        if np.abs(away).max() < BEGINNING and (times == 1 or np.linalg.norm(_half_shift(taken)) > length):
+        if np.abs(away).max() < BEGINNING and (times == 1 or np.linalg.norm(_half_shift(taken, scale)) > length):
             return _branch(family, begun.turns, follower, taken, watch, stop, largest)
     motion = "of twice the period" if times > 1 else "that branches off"
     raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
+
+
+def _sizes(orbits: Sequence[PeriodicOrbit]) -> NDArray[np.float64]:
+    """Return for each component of y how large motions are, relative to the scale: thirty times the amplitude, 1 at most.
+
+    Motions may be much smaller than the links that give the scale.
+    """
+    flow, scale = orbits[0].flow, orbits[0].scale
+    free = len(flow.free)
+    amplitudes = np.max([orbit.amplitudes for orbit in orbits], axis=0)[:free] / scale[:free]
+    sizes = np.where(amplitudes > 0.0, np.minimum(30.0 * amplitudes, 1.0), 1.0)
+    return np.concatenate([sizes, sizes, np.ones(flow.size - 2 * free)])
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
@@ -447,15 +460,16 @@ def _meets_half(before: Point, after: Point) -> bool:
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
         return False
     try:
-        return bool(_half_shift(before) @ _half_shift(after) < 0.0)
+        scale = after.data.scale
+        return bool(_half_shift(before, scale) @ _half_shift(after, scale) < 0.0)
     except OrbitError:
         return False
 
 
-def _half_shift(point: Point) -> NDArray[np.float64]:
-    """Return the change of y, relative to the scale, over half of the period."""
+def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the change of y, relative to a scale, over half of the period."""
     orbit: PeriodicOrbit = point.data
-    return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / orbit.scale)
+    return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / scale)
 
 
 def _test(point: Point, kind: Crossing) -> float:
@@ -555,7 +569,7 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
     parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
-    scale = np.append(np.max([o.scale for o in ends], axis=0), width)
+    scale = np.append(np.max([o.scale for o in ends], axis=0) * _sizes(branch.orbits), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     away = ends[0].flow.remove_turns(points[:, :-1] - motion)
     near = np.abs(away / scale[:-1]).max(axis=1).argmin()
