@@ -33,7 +33,13 @@ TARGET, SHADE, MARKED = "#E69F00", "#56B4E9", "0.25"
 #: Light colours of classes of points.
 LIGHT = ("#C6DFF0", "#F6C99F", "#A8DDB5", "#E7B9D6", "#F2E394", "#E0E0E0")
 #: Shades of ranges in order: colour, Matplotlib's hatching, Plotly's hatching.
-SHADES = (("#E69F00", "", ""), ("#56B4E9", "//", "/"), ("#009E73", "..", "."), ("#D55E00", "xx", "x"))
+SHADES = (
+    ("#E69F00", "", ""),
+    ("#56B4E9", "//", "/"),
+    ("#009E73", "..", "."),
+    ("#D55E00", "xx", "x"),
+    ("#CC79A7", "\\\\", "\\"),
+)
 
 #: Font sizes (points): figure titles, drawings, titles of panels and axes, legends and notes, marks in a panel.
 TITLE, LETTER, PLAIN, SMALL, TINY = 10.5, 10.5, 9.0, 8.0, 7.5

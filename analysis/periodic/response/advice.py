@@ -48,9 +48,9 @@ class Risk(Enum):
 
     RESONANCE = "resonance, above 0.71 of the peak"
     SEVERAL = "several stable motions, jumps between them"
-    UNBOUNDED = "resonance that no damping limits"
     DOUBLED = "stable only with a period of several turns"
     UNSTABLE = "no stable motion found"
+    UNBOUNDED = "resonance that no damping limits"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
