@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.numerics.workers import run_in_parallel
+from analysis.synthesis import synthesize
 from analysis.synthesis.search.polish import Polished, polish
 from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
@@ -342,7 +343,7 @@ class TestTradeOff:
 
         def search(*arguments: Any, **more: Any) -> Any:
             calls.append(more)
-            found = syn.synthesize(*arguments, **more)
+            found = synthesize(*arguments, **more)
             return found if len(calls) == 3 else replace(found, solutions=(poor,))
 
         monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
@@ -358,10 +359,10 @@ class TestTradeOff:
         def search(*arguments: Any, **more: Any) -> Any:
             calls.append(more)
             if len(calls) <= stop:
-                return syn.synthesize(*arguments, **more)
+                return synthesize(*arguments, **more)
             if by == "key":
                 raise KeyboardInterrupt
-            raise syn.SynthesisInterrupted(syn.synthesize(*arguments, **more), 1, 2)
+            raise syn.SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
 
         monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
         with pytest.raises(
