@@ -98,7 +98,7 @@ def read_text(path: Path) -> str:
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} cannot be read: it is not text in {encoding[:6].upper()}") from error
+        raise InputError(f"{path} cannot be read: it is not text in {encoding.removesuffix('-sig').upper()}") from error
     return io.StringIO(text, newline=None).getvalue()
 
 

@@ -32,8 +32,18 @@ def library() -> Any:
 def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> ReboundFunctions:
     """Return copies of the functions of ``modules`` for CasADi symbols; ``others`` replace further functions, by name."""
     casadi = library()
-    functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
+    functions = {name: _power if name == "pow" else getattr(casadi, name) for name in ELEMENTARY}
     return rebind_functions(modules, functions | others)
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """Return the power of a symbol; at base zero all derivatives of a positive power are zero, where CasADi's own are NaN.
+
+    ``max(x, 0)**1.5`` then has its derivatives, which are zero, at every x below zero, too.
+    """
+    casadi = library()
+    none = (1.0 - casadi.fabs(casadi.sign(base))) * casadi.fmax(casadi.sign(exponent), 0.0)
+    return (1.0 - none) * casadi.power(base + none, exponent)
 
 
 def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:

@@ -22,7 +22,7 @@ from linkwork.errors import InputError, Interrupted, LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..display import format_count
-from ..files import unknown_name
+from ..files import Whole, unknown_name
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import WorkersLost, check_jobs, record_interrupts, run_in_parallel, share_memory
 from ..units import Amount, in_si
@@ -249,8 +249,8 @@ def simulate_many(
     if len(parameters) == 0:
         raise InputError("an ensemble needs at least one set of parameters")
     batch = options.get("batch")
-    if batch is not None and batch < 1:
-        raise InputError(f"batch is {batch}: it must be at least 1")
+    if batch is not None:
+        batch = Whole(least=1)(batch, "batch")
     check_jobs(n_jobs)
     mechanism = find_mechanism(parameters[0])
     if any(find_mechanism(p) is not mechanism for p in distinct_objects(parameters)):

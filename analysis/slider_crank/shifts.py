@@ -281,7 +281,9 @@ class Course:
         return tuple(found)
 
     def _shift(self, angle: FloatArray) -> ShiftMotion:
-        return self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
+        moving = self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
+        # a function of a law may return a number for all angles
+        return ShiftMotion(*(np.broadcast_to(x, angle.shape) for x in moving))
 
     def _assembly_square(self, angle: FloatArray) -> FloatArray:
         """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from analysis import InductionMotor, Inputs
+from analysis.linkages import linkage
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -405,6 +406,36 @@ def test_an_unstable_motion_that_is_followed_in_pieces() -> None:
 
         found = difference(size, motion.values[column], step)
         assert close(found, motion.amplitude.by[column : column + 1], motion.amplitude.value, step), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["c*max(x - g, 0)", "c*max(x - g, 0)**1.5", "c*max(x - g, 0)**2.5"])
+def test_a_motion_against_a_stop_changes_as_its_differences_say(law: str) -> None:
+    """The derivatives of the rates jump where the block meets the stop, or change like a root; multipliers move with it."""
+    bar = linkage("yoke", ground={"A": (0.0, 0.0)}, gravity=0)
+    bar.body("crank", bar=("A", "B"), length=0.01, mass=0.1, inertia=1e-4)
+    bar.body("yoke", points={"Y": (0.0, 0.0)}, mass=1.0, inertia=1e-3)
+    bar.body("block", points={"Q": (0.0, 0.0)}, mass=2.0, inertia=1e-3)
+    bar.slide("guide", body="yoke", through="A", direction=0).slide(
+        "way", body="block", on="yoke", through="Y", direction=0
+    )
+    bar.slot("slot", pin="B", on="yoke", through="Y", direction=0.5 * pi)
+    bar.spring("soft", at="way", stiffness=800.0, free=0, damping=4.0)
+    stiff = 2e3 if law.endswith(")") else 2e6 if law.endswith("1.5") else 2e8
+    bar.spring("stop", at="way", law=law, constants={"c": stiff, "g": 0.001})
+    bar.freedom("turn", "A", speed=25.0).freedom("shift", "way", start=0.0)
+    orbit = newton_orbit(bar.mechanism().first_set.parameters, Drive(speed=25.0))
+    motion = motion_gradient(orbit, ("stop.g", "soft.stiffness", "block.mass", "drive.speed"))
+    for column, name in enumerate(motion.names):
+        step = step_of(orbit, name, 2e-3)
+
+        def sizes(value: float, name: str = name) -> FloatArray:
+            there = changed(orbit, name, value)
+            return np.append(there.start, there.monodromy.trace())
+
+        found = difference(sizes, motion.values[column], step)
+        exact = np.append(motion.start[:, column], motion.monodromy.trace()[column])
+        assert found == pytest.approx(exact, rel=1e-3), name
 
 
 @pytest.mark.slow

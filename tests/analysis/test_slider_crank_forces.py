@@ -324,14 +324,17 @@ def test_limits_of_assembly_are_where_the_cosine_says() -> None:
     mechanism = replace(parameters(-20.0), rod_length=30.0 * INCH)
     s1 = 3.5 * INCH
     end = np.arccos((20.0 - np.sqrt(30.0**2 - 3.5**2)) / 12.0)
-    same = AngleShift(lambda th: s1 + 0.0 * th, lambda th: 0.0 * th, lambda th: 0.0 * th)
+    same = AngleShift(lambda th: s1, lambda th: 0.0, lambda th: 0.0)
     angles = np.linspace(-pi, 3.0 * pi, 145)
+    centres = []
     for law in (ConstantShift(s1), same):
         turn = force_turn(mechanism, crank_speed=1.0, shift=law, angles=angles, load=1.0, partial=True)
         assert turn.limits == pytest.approx([-end, end, tau - end, tau + end], abs=1e-9)
         assert turn.angle[list(turn.breaks)] == pytest.approx([angles[angles < end].max()])
         away = np.abs(turn.angle[:, None] - [-end, end, tau - end, tau + end]).min(axis=1)
         assert turn.clear(12.0).tolist() == (away > radians(12.0)).tolist()
+        centres.append(sorted(centre.crank_angle for centre in turn.dead_centres))
+    assert centres[0] == pytest.approx(centres[1], abs=1e-9)
     # both ends between two of the angles: no angle is left out, and there is a break all the same
     coarse = force_turn(mechanism, crank_speed=1.0, shift=SHIFT, angles=[0.0, 2.0, tau - 2.0, tau], load=1.0)
     assert coarse.unreachable.size == 0

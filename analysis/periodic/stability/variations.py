@@ -31,10 +31,15 @@ from ..motion.orbit import PeriodicOrbit
 
 FloatArray = NDArray[np.float64]
 #: Gauss points of a panel; panels of a turn at first; halvings of a panel at most.
-_POINTS, _PANELS, _HALVINGS = 8, 32, 16
+_POINTS, _PANELS, _HALVINGS = 8, 32, 40
 #: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
 #: and of the effect of a parameter, relative to its greatest.
 _RESOLVED, _EFFECT = 1e-10, 1e-8
+#: Jump of the same quantities between two panels above which both are halved.
+_CONTINUOUS = 1e-8
+#: A kink is in a panel shorter than ``_KINK`` (rad), over which the derivatives of the rates change by more than ``_STEEP``
+#: times their greatest value times the square root of its length: more than a root does, the derivative of a power 1.5.
+_KINK, _STEEP = 1e-6, 30.0
 #: Imaginary part below which a root counts as real.
 _REAL = 1e-9
 #: Effect of a parameter on the rates, relative to the effect of the motion, below which it counts as a rounding error; both are
@@ -45,8 +50,15 @@ _AGREES = 1e-6
 #: Least singular value, relative to the norm, up to which a matrix is singular to within rounding.
 _ROUNDING = 1e-15
 _GAUSS = gauss(_POINTS)
+#: Values of the Legendre polynomials at the beginning of a panel; at the end they are 1.
+_SIGNS = (-1.0) ** np.arange(_POINTS)
 #: Legendre polynomials on a grid over a panel, its two ends included.
 _GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
+
+
+def _greatest(values: FloatArray) -> FloatArray:
+    """Return the greatest modulus in each panel, shape (k,), of values of shape (k, ...)."""
+    return np.asarray(np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0))
 
 
 class Place(NamedTuple):
@@ -55,6 +67,19 @@ class Place(NamedTuple):
     panel: int  # index of the panel
     position: float  # position on the panel, from -1 to 1
     weights: FloatArray  # weights of the values at the nodes that interpolate at the point, shape (s,)
+
+
+class _Kink(NamedTuple):
+    """A panel at which the derivatives of the rates jump, with the jumps.
+
+    The rates are continuous at a kink: before it they are F, after it F + g h, where h, a function of y, of the angle and of
+    the constants, is zero at the kink. The jumps are therefore multiples of g.
+    """
+
+    panel: int  # index of the panel
+    by_y: FloatArray  # jump of the derivatives of the rates by y, shape (n, n)
+    by_constant: FloatArray  # jump of the derivatives by the drive vector and the constants, (n, c)
+    slope: FloatArray  # jump of the derivative of the rates along the motion by the angle, (n,)
 
 
 class Variations:
@@ -92,6 +117,7 @@ class Variations:
         self.orbit, self.switched, self.flow = orbit, switched, orbit.flow
         self._drive, self._p, self.scale = orbit.point.vector, orbit.point.constants, orbit.scale
         self._divide(along)
+        self._kinks = self._find_kinks()
         self._solve_panels()
         wrong = float(np.abs(self.monodromy - orbit.monodromy).max() / max(1.0, np.abs(orbit.monodromy).max()))
         if not wrong < _AGREES * max(1.0, *(self.scale[:, None] / self.scale).ravel()):
@@ -126,11 +152,39 @@ class Variations:
                 (self.by_y, relative),
                 (self.forcing, self.scale[:, None] * effect * (_EFFECT / _RESOLVED)),
             ):
-                last = np.abs(np.einsum("is,ks...->k...i", _GAUSS.coefficients[-2:], values / size))
-                rough |= self.h * last.reshape(len(self.h), -1).max(axis=1, initial=0.0) > _RESOLVED
+                series = np.einsum("is,ks...->ki...", _GAUSS.coefficients, values / size)
+                rough |= self.h * _greatest(series[:, -2:]) > _RESOLVED
+                # a kink between the last node of a panel and the first node of the next one
+                gaps = series.sum(axis=1) - np.roll(np.einsum("i,ki...->k...", _SIGNS, series), -1, axis=0)
+                apart = np.maximum(self.h, np.roll(self.h, -1)) * _greatest(gaps) > _CONTINUOUS
+                rough |= apart | np.roll(apart, 1)
             if not rough.any():
                 break
             edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
+
+    def _find_kinks(self) -> list[_Kink]:
+        """Return the panels at which the derivatives of the rates jump, as at the bend of a spring's table.
+
+        A kink is between the first node of its panel and the first node of the next one.
+        """
+        relative = self.scale[:, None] / self.scale
+        jumps = _greatest((np.roll(self.by_y[:, 0], -1, axis=0) - self.by_y[:, 0]) / relative)
+        steep = jumps > _STEEP * np.sqrt(self.h) * np.abs(self.by_y / relative).max()
+        slope, kinks = _angle_derivatives(self.flow, self.switched), []
+        for k in np.flatnonzero(steep & (self.h < _KINK)).tolist():
+            before, after = (
+                (
+                    self.by_y[e, 0],
+                    self.by_constant[e, 0],
+                    np.asarray(
+                        slope(self.angles[e, 0], self.y[e, 0], list(self.flow.modes), self._drive, self._p)
+                    ).ravel(),
+                )
+                for e in (k, (k + 1) % len(self.h))
+            )
+            by_y, by_constant, by_angle = map(np.subtract, after, before)
+            kinks.append(_Kink(k, by_y, by_constant, by_y @ self.rates[k, 0] + by_angle))
+        return kinks
 
     def _sample_motion(self) -> FloatArray:
         """Return the motion at the nodes, shape (k, s, n)."""
@@ -192,7 +246,14 @@ class Variations:
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
         found = found.reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
-        return found[..., :n], found[..., n:]
+        by_y, by_constant = found[..., :n], found[..., n:]
+        for kink in self._kinks:
+            # along the direction the kink comes earlier by ``ahead``; all changes at a kink are multiples of one vector
+            change = kink.by_y @ direction[kink.panel, 0] + (0.0 if along is None else kink.by_constant @ along)
+            ahead = (change / self.scale**2) @ kink.slope / np.sum((kink.slope / self.scale) ** 2)
+            by_y[kink.panel] += kink.by_y * (ahead / self.h[kink.panel])
+            by_constant[kink.panel] += kink.by_constant * (ahead / self.h[kink.panel])
+        return by_y, by_constant
 
     # Linear equations
 
@@ -418,6 +479,15 @@ def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
             casadi.vertcat(s.p, s.d_p),
         ]
         return MachineCode([casadi.Function(name, arguments, [casadi.densify(r) for r in results], {"cse": True})])
+
+
+@cache
+def _angle_derivatives(flow: Flow, switched: bool) -> Any:
+    """Return the function that gives the derivatives of the rates by the angle."""
+    casadi = symbolic.library()
+    s = _symbols(flow, switched)
+    slopes = casadi.densify(casadi.jacobian(s.rates, s.angle))
+    return casadi.Function("slopes", [s.angle, s.y, s.modes, s.drive, s.p], [slopes], {"cse": True})
 
 
 @cache
