@@ -65,6 +65,18 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
 
 
+def test_starts_stay_where_a_stiffening_spring_is_not_too_stiff() -> None:
+    """Also if links limit the room: the search there took minutes."""
+    built = linkage("stiff", ground={"A": (0, 0), "O": (0.15, 0)}, assembly={"C": 1})
+    built.body("crank", bar=("A", "B"), length=0.05, mass=0.1)
+    built.body("coupler", bar=("B", "C"), length=0.15, mass=0.2).body("rocker", bar=("D", "C"), length=0.15, mass=0.2)
+    built.body("block", points={"D": (0, 0)}, mass=0.6).slide("G", body="block", through="O")
+    built.spring("spring", at="G", stiffness=1e3, damping=30.0, law="1e9*x**3")
+    rig = built.freedom("crank", "A", speed=44.0).freedom("slider", "G").mechanism().first_set.parameters
+    starts = spread_starts(rig, Drive(speed=44.0), np.zeros(2), 64)
+    assert 0.02 < np.abs(starts[:, 0]).max() < 0.05  # 1e9 x^2 / 0.8 < (30 * 44)^2
+
+
 def duffing(length: float, law: str = "2.5e6*x**3") -> str:
     """Describe an unbalanced rotor on a sprung carriage, Duffing's equation, with bodies of any length; return its name."""
     built = linkage(f"duffing-{length:.0f}", ground={"A": (0, 0)})

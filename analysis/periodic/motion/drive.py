@@ -676,8 +676,11 @@ def _slow_distances(
     found = distances.copy()
     for i, away in enumerate(distances.tolist()):
         most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
-        while square(i, found[i]) > most and abs(found[i]) > 1e-3 * abs(away):
-            found[i] /= _WIDER
+        # a bound may lie a step beyond the limit of assembly, where there are no accelerations
+        inside = away if isfinite(square(i, away)) else away / _WIDER
+        while square(i, inside) > most and abs(inside) > 1e-3 * abs(away):
+            inside /= _WIDER
+            found[i] = inside
     return found
 
 
