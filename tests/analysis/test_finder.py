@@ -108,6 +108,16 @@ def test_doubled_branches_do_not_depend_on_the_length_of_the_bodies() -> None:
     assert [(a.risk, (a.low, a.high)) for a in response.speeds_to_avoid] == found[0]
 
 
+def test_two_motions_of_a_symmetric_machine_are_found_where_newtons_method_mostly_fails() -> None:
+    """Each is the mirror image of the other, half a turn later."""
+    rig = variant(duffing(0.1), rotor_cog_x=1.0, spring_damping=1.5)
+    found = find_orbits(rig, speed=30.03)
+    first, second = found.stable
+    mirrored = -second.sample(np.array([pi]))[0, list(second.flow.places)]
+    assert mirrored == pytest.approx(first.start, rel=1e-6)
+    assert (found.agreed, len(found)) == (True, 3)
+
+
 def test_basins_do_not_depend_on_the_length_of_the_bodies() -> None:
     plane = {"position": (-0.025, 0.025), "rate": (-0.9, 0.9)}
     short, long = (basins(duffing(length), Drive(speed=36.0), points=6, **plane) for length in (0.1, 2.0))

@@ -1,9 +1,9 @@
 """Search for periodic motions: all motions at an operating point, the motion that a machine reaches, or a sweep over speeds.
 
 Newton's method finds one motion, which depends on the guess. `find_orbits` uses two methods that share only the map over a
-period: many starts that fill the region in which the mechanism can be assembled; and, from fewer starts, deflation, which
-divides out each motion that was found. If both find the same motions, and the sum of their indices is 1, it is unlikely that
-one was missed.
+period: many starts that fill the region in which the mechanism can be assembled, some of which are followed for some turns if
+Newton's method fails; and, from fewer starts, deflation, which divides out each motion that was found. If both find the same
+motions, and the sum of their indices is 1, it is unlikely that one was missed.
 
 `find_orbit` returns the motion that a machine reaches when it is run up slowly from rest; `sweep` steps through speeds as a
 machine does, including jumps between motions.
@@ -258,6 +258,8 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
 
 #: Number of starts of each of the two methods in a round, and greatest number of rounds.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
+#: Number of starts in a round from which Newton's method fails and the motion is followed instead, and turns at most.
+_FOLLOWED, _TURNS = 8, 50
 #: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
@@ -526,12 +528,13 @@ def _search_rounds(
             for share in (0.0, 0.25, 0.5, 0.75)
         )
         places += [place for place in near if place is not None]
-    settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
-    if settled[0] is Status.DONE:
-        places.append(settled[1])
+    many.follow(guess)
     for number in range(ROUNDS):
         for place in places:
             many.seek(place, divide=False)
+        for place in many.failed[:_FOLLOWED]:
+            many.follow(place)
+        many.failed.clear()
         # starts that the first method does not use
         for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.intermediate_starts()):
             while deflated.seek(place, divide=True):
@@ -568,6 +571,8 @@ class _FoundMotions:
         self.known = np.empty((0, len(guess)))
         #: See `Orbits`.
         self.index = 0
+        #: Starts from which Newton's method without deflation failed.
+        self.failed: list[FloatArray] = []
 
     def places(self, count: int, number: int) -> list[FloatArray]:
         """Return the starts in the set with the index ``number``: see `spread_starts`."""
@@ -581,12 +586,20 @@ class _FoundMotions:
     def seek(self, place: FloatArray, *, divide: bool) -> bool:
         """Search from a guess, with the known motions divided out if ``divide``; return whether a new motion was found."""
         start = approach_orbit(self.point, self.turns, place, self.known if divide else None)
+        if start is None and not divide:
+            self.failed.append(place)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
         try:
             return self.add(solve_orbit(self.point, self.turns, self.point.flow.nearest_to_rest(start)))
         except OrbitError:
             return False
+
+    def follow(self, place: FloatArray) -> None:
+        """Search from the state in which the mechanism is some turns after a start: stable motions have wide basins."""
+        status, start = settle_motion(self.point, place, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=_TURNS)
+        if status is Status.DONE:
+            self.seek(start, divide=False)
 
     def add(self, orbit: PeriodicOrbit) -> bool:
         """Add a motion to the motions found; return whether it is new."""
