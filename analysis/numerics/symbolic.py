@@ -39,11 +39,14 @@ def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> Reboun
 def _power(base: Any, exponent: Any) -> Any:
     """Return the power of a symbol; at base zero all derivatives of a positive power are zero, where CasADi's own are NaN.
 
-    ``max(x, 0)**1.5`` then has its derivatives, which are zero, at every x below zero, too.
+    ``max(x, 0)**1.5`` then has its derivatives, which are zero, at every x below zero, too. Powers 1, 2 and 3 keep theirs.
     """
     casadi = library()
+    if isinstance(exponent, float | int) and float(exponent).is_integer():
+        return casadi.power(base, exponent)
     none = (1.0 - casadi.fabs(casadi.sign(base))) * casadi.fmax(casadi.sign(exponent), 0.0)
-    return (1.0 - none) * casadi.power(base + none, exponent)
+    whole = sum((1.0 - casadi.fabs(casadi.sign(exponent - n))) * base**n for n in (1, 2, 3))
+    return (1.0 - none) * casadi.power(base + none, exponent) + none * whole
 
 
 def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:

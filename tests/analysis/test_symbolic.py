@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import cmath
 import math
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
 from analysis.mechanisms import FIVE_BAR, find_mechanism
-from analysis.numerics.symbolic import ELEMENTARY
+from analysis.numerics.symbolic import ELEMENTARY, symbolic_functions
 from analysis.numerics.tracing import rebind_functions
 from analysis.run import symbolic_equations
 from linkwork import friction
@@ -68,3 +69,18 @@ def test_nothing_of_the_plain_modules_is_changed() -> None:
     symbolic_equations(FIVE_BAR)
     assert kinematics.sin.__module__ == friction.tanh.__module__ == "math"
     assert dynamics.position is kinematics.position
+
+
+@pytest.mark.parametrize("written", [True, False])
+@pytest.mark.parametrize(
+    ("exponent", "slopes"), [(1.0, [0, 1, 0, 0]), (2.0, [0, 0, 2, 0]), (3.0, [0, 0, 0, 6]), (3.5, [0, 0, 0, 0])]
+)
+def test_powers_have_their_derivatives_at_zero(exponent: float, slopes: list[float], written: bool) -> None:
+    """With the exponent as a number in the formula, and as a constant."""
+    module = ModuleType("law")
+    exec(f"from math import pow\ndef force(x, n):\n    return pow(x, {exponent if written else 'n'})", module.__dict__)
+    x, n = casadi.SX.sym("x"), casadi.SX.sym("n")
+    found = [symbolic_functions((module,)).find(module.force)(x, n)]
+    for _ in range(3):
+        found.append(casadi.jacobian(found[-1], x))
+    assert [float(value) for value in casadi.Function("slopes", [x, n], found)(0.0, exponent)] == slopes
