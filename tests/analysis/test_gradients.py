@@ -42,6 +42,7 @@ from analysis.periodic import (
 )
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.drive import motion_scales
+from analysis.periodic.motion.orbit import trial_orbit
 from analysis.periodic.motion.variables import parameter_unit, parameter_value, with_values
 from analysis.periodic.stability import sensitivity as gradients
 from analysis.periodic.stability.variations import _GAUSS, Variations
@@ -436,6 +437,13 @@ def test_a_motion_against_a_stop_changes_as_its_differences_say(law: str) -> Non
         found = difference(sizes, motion.values[column], step)
         exact = np.append(motion.start[:, column], motion.monodromy.trace()[column])
         assert found == pytest.approx(exact, rel=1e-3), name
+
+
+def test_the_end_of_a_motion_that_is_not_closed_is_no_bend_of_a_law() -> None:
+    closed = newton_orbit(RIG_2_C, Drive(speed=50.0))
+    orbit, _ = trial_orbit(closed.point, closed.start + 0.1 * closed.scale, 1)
+    counts = [len(motion_gradient(motion, ("slider.stiffness",)).variations.h) for motion in (closed, orbit)]
+    assert counts[1] == counts[0]
 
 
 @pytest.mark.slow

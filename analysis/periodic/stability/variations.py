@@ -156,11 +156,18 @@ class Variations:
                 rough |= self.h * _greatest(series[:, -2:]) > _RESOLVED
                 # a kink between the last node of a panel and the first node of the next one
                 gaps = series.sum(axis=1) - np.roll(np.einsum("i,ki...->k...", _SIGNS, series), -1, axis=0)
-                apart = np.maximum(self.h, np.roll(self.h, -1)) * _greatest(gaps) > _CONTINUOUS
+                apart = self._joined & (np.maximum(self.h, np.roll(self.h, -1)) * _greatest(gaps) > _CONTINUOUS)
                 rough |= apart | np.roll(apart, 1)
             if not rough.any():
                 break
             edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
+
+    @property
+    def _joined(self) -> NDArray[np.bool_]:
+        """Whether the motion goes on without a gap from each panel to the next; from the last to the first if it is closed."""
+        joined = np.ones(len(self.h), dtype=bool)
+        joined[-1] = self.orbit.residual <= _CONTINUOUS
+        return joined
 
     def _find_kinks(self) -> list[_Kink]:
         """Return the panels at which the derivatives of the rates jump, as at the bend of a spring's table.
@@ -170,8 +177,9 @@ class Variations:
         relative = self.scale[:, None] / self.scale
         jumps = _greatest((np.roll(self.by_y[:, 0], -1, axis=0) - self.by_y[:, 0]) / relative)
         steep = jumps > _STEEP * np.sqrt(self.h) * np.abs(self.by_y / relative).max()
-        slope, kinks = _angle_derivatives(self.flow, self.switched), []
-        for k in np.flatnonzero(steep & (self.h < _KINK)).tolist():
+        kinks = []
+        for k in np.flatnonzero(steep & self._joined & (self.h < _KINK)).tolist():
+            slope = _angle_derivatives(self.flow, self.switched)
             before, after = (
                 (
                     self.by_y[e, 0],
