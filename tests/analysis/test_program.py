@@ -455,6 +455,18 @@ class TestBetween:
             over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
 
+    def test_transmission_angle_in_the_step_before_a_station_after_which_steps_are_shorter(self) -> None:
+        task = syn.TimedPath(points=ellipse(24)[:3], rotation=[0.0, 1.6, 1.7])
+        normal = syn.normal_form(task)
+        # the crank lies along the ground link nearer to the station than to the rotation before it
+        linkage = syn.Linkage(
+            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, crank_phase=math.pi - 1.46
+        )  # fmt: skip
+        least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
+        asked = (syn.LeastTransmission(angle=least + 1e-5, over="task"), syn.LargestLink(length=1.0))
+        limits = make_limits(task, normal, None, asked)
+        assert violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"] > 0.0
+
     @pytest.mark.parametrize("judged", [False, True])
     def test_transmission_angle_over_a_turn_with_a_moved_pivot(self, judged: bool) -> None:
         """With gears -3 the angle is extreme between the rotations of the grid; a search has half a degree to spare."""

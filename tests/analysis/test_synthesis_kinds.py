@@ -242,6 +242,8 @@ class TestQuickSwing:
             syn.synthesize(task, {"pivot_x": (0.0, 0.0)})
         with pytest.raises(ParameterError, match=r"bounds of crank_length is 0\.05: it must be two numbers"):
             syn.synthesize(task, {"crank_length": 0.05})  # type: ignore[dict-item]
+        with pytest.raises(ParameterError, match=r"crank_length is 0\.0: it must be above zero"):
+            syn.synthesize(task, {"crank_length": (0.0, 0.0)})
         with pytest.raises(InputError, match="cannot keep TimeRatio: leave it out, or ask for a RockerFunction"):
             syn.synthesize(task, constraints=[syn.TimeRatio(least=1.1)])
         with pytest.raises(InputError, match="has no weights"):
@@ -288,7 +290,7 @@ class TestSearch:
         [
             ({"pivot_y": ("-60 mm", "-30 mm")}, -0.03, 3.3294e-3),
             ({"pivot_y": (0.02, 0.02)}, 0.02, 1.6006e-3),
-            ({"ground_length": (0, 0)}, 0.0, 2.7618e-3),
+            ({"ground_length": (None, 0)}, 0.0, 2.7618e-3),
         ],
     )
     def test_the_shaft_stays_in_its_bounds_beside_the_guide(self, bounds: Any, height: float, rms: float) -> None:

@@ -30,7 +30,7 @@ from ..linkage.linkage import LINKS, Linkage, SliderCrank
 from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
 from ..task.limit_position import dead_centres
-from ..task.limits import GROUND, LARGEST, check_bounds, complete_bounds
+from ..task.limits import GROUND, LARGEST, check_bounds, check_greatest_length, complete_bounds
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
@@ -179,7 +179,7 @@ class _SwingShapes:
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
-        self.bounds = _read_bounds(bounds, LINKS)
+        self.bounds = _read_bounds(bounds, LINKS, LINKS)
         self.cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
         chord = 2.0 * sin(0.5 * abs(float(task.swing)))
         most = chord / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
@@ -231,14 +231,19 @@ class _SwingShapes:
         return min(begun, key=lambda one: Solution.from_linkage(self.task, one).error)
 
 
-def _read_bounds(bounds: Any, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the least and greatest length of each dimension in ``names`` (m): as given, or zero and infinity."""
+def _read_bounds(bounds: Any, names: Sequence[str], links: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the least and greatest length of each dimension in ``names`` (m): as given, or zero and infinity.
+
+    ``links`` are the names of those that cannot be zero.
+    """
     given = check_bounds(bounds)
     for name in given:
         if name not in names:
             raise ParameterError(name, given[name], f"bound one of {', '.join(names)}: the other dimensions follow")
     free = 0.0, inf
     both = {name: complete_bounds(name, given.get(name, free), free) for name in names}
+    for name in links:
+        check_greatest_length(name, both[name][1])
     return {name: (max(low, 0.0), high) for name, (low, high) in both.items()}
 
 
@@ -247,7 +252,9 @@ def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]
     cap = min(
         (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
     )
-    ends = {name: (low, min(cap, high)) for name, (low, high) in _read_bounds(bounds, BOUNDED).items()}
+    ends = {
+        name: (low, min(cap, high)) for name, (low, high) in _read_bounds(bounds, BOUNDED, SliderCrank.links).items()
+    }
     # the coupler is at least half the stroke, as with a time ratio of 1 and no offset
     low, high = ends["coupler_length"]
     turned = task.advance

@@ -426,6 +426,11 @@ class Statement:
         if limits.way is not None or (tilt is not None and limits.turn is None):
             x, step = self._dense_rotations(phi)
             least = limits.way or 0.0
+            if not self._judged:
+                # the step before a station may be longer than that after it
+                step[1 : self.normal.n] = casadi.fmax(
+                    casadi.fabs(step[: self.normal.n - 1]), casadi.fabs(step[1 : self.normal.n])
+                )
             if self.pivot is not None:
                 self._bound_reach(p, v, x, step, least, tilt)
                 return

@@ -219,8 +219,8 @@ def _dimension_ranges(
     for name in (*LINKS, "point_distance"):
         low, high = ends[name]
         link = name in linkage.links
-        if link and high <= 0.0:
-            raise ParameterError(f"bound of {name}", high, "be above zero (m): a link has a length")
+        if link:
+            check_greatest_length(name, high)
         if caps and low > cap:
             raise InfeasibleError(
                 f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
@@ -275,6 +275,12 @@ def check_bounds(bounds: Mapping[str, tuple[float, float]] | None) -> Mapping[st
     if not isinstance(bounds, Mapping | None):
         raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
     return bounds or {}
+
+
+def check_greatest_length(name: str, high: float) -> None:
+    """Raise ParameterError if the greatest length of a link is not above zero."""
+    if high <= 0.0:
+        raise ParameterError(f"bound of {name}", high, "be above zero (m): a link has a length")
 
 
 def complete_bounds(
@@ -448,10 +454,10 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
             ),
         )
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds)
-    given = {"ground_length": (0.0, None)} | {n: ends for n, ends in bounds.items() if n != "rocker_length"}
-    limits = make_limits(task, normal, given, own, linkage=SliderCrank)
-    least = given["ground_length"][0]
-    if least is not None and -inf < least < 0.0:
+    given = {n: ends for n, ends in bounds.items() if n != "rocker_length"}
+    least, most = complete_bounds("ground_length", bounds.get("ground_length", (None, None)), (0.0, inf))
+    limits = make_limits(task, normal, given | {"ground_length": (least, most)}, own, linkage=SliderCrank)
+    if least < 0.0:
         raise ParameterError(
             "bound of ground_length",
             least,
