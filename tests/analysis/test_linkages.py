@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from analysis import figures
+from analysis import figures, variant
 from analysis.files import entry_names
 from analysis.linear import linearise
 from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, reach, read_description
@@ -29,6 +29,7 @@ from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.periodic import (
     Drive,
+    PeriodicOrbit,
     find_orbit,
     frequency_response,
     largest_multipliers,
@@ -977,6 +978,18 @@ def test_the_greatest_force_of_a_stop_is_found_between_the_samples() -> None:
     start = {"x_position": orbit.start[0], "x_velocity": orbit.start[1]}
     run = simulate(known.parameters, Inputs(speed=10.0 * math.pi), initial=start, stop_time=0.2, step=1e-5)
     assert value == pytest.approx(run["stop.exerted_force"].max(), rel=1e-4)
+
+
+def test_rounding_errors_of_a_motion_nearly_at_rest_take_no_more_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    known, found = striker(2e7).first_set.parameters, PeriodicOrbit.turn
+    orbit, noise = newton_orbit(variant(known, rotor_mass=1e-9), Drive(speed=10.0 * math.pi)), np.random.default_rng(1)
+
+    def turn(self: PeriodicOrbit, samples: int = 256) -> Any:
+        made = found(self, samples)
+        return replace(made, values=made.values + 1e-14 * noise.normal(size=made.values.shape))
+
+    monkeypatch.setattr(PeriodicOrbit, "turn", turn)
+    assert len(orbit.resolved_turn(["x.position"]).angle) == 256
 
 
 def test_the_amplitude_of_a_flywheel_that_a_press_slows_down_suddenly() -> None:

@@ -189,10 +189,10 @@ class Turn:
         return 2.0 * float(np.abs(np.fft.rfft(self.oscillation(name))[int(number)])) / len(self.angle)
 
 
-def _is_sharp(samples: FloatArray) -> bool:
-    """Return whether the highest harmonics of samples over a period are not negligible."""
-    size = np.abs(np.fft.rfft(samples))[1:]
-    return bool(size[3 * len(size) // 4 :].max() > _SHARP * size.max())
+def _is_sharp(samples: FloatArray, rounding: float) -> bool:
+    """Return whether the highest harmonics of samples over a period are not negligible, nor rounding errors."""
+    size = np.abs(np.fft.rfft(samples))[1:] * (2.0 / len(samples))
+    return bool(size[3 * len(size) // 4 :].max() > max(_SHARP * size.max(), rounding))
 
 
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
@@ -383,7 +383,10 @@ class PeriodicOrbit(NotebookResult):
     def resolved_turn(self, outputs: Sequence[str], samples: int = SAMPLES) -> Turn:
         """Return the outputs as `turn` does, with as many samples as the Fourier series of the named outputs need."""
         turn, most = self.turn(samples), _MOST_SAMPLES * self.periods
-        while len(turn.angle) < most and any(_is_sharp(turn.oscillation(name)) for name in outputs):
+        roundings = dict(zip(turn.swings, turn.roundings))
+        while len(turn.angle) < most and any(
+            _is_sharp(turn.oscillation(name), roundings.get(name, 0.0)) for name in outputs
+        ):
             turn = self.turn(2 * len(turn.angle))
         return turn
 
