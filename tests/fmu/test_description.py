@@ -18,7 +18,6 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 import linkwork
-from analysis.export import description as terminals
 from analysis.export import description as writer
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from build_fmu import FMUS
@@ -155,7 +154,7 @@ def written(mechanism: Mechanism, kind: str, folder: Path) -> Path:
     if KINDS[kind].fmi == 3:
         identifier = KINDS[kind].identifier(mechanism)
         xml["sources/buildDescription.xml"] = writer.build_description(identifier, ["all.c", "equations.c"])
-        xml["terminalsAndIcons/terminalsAndIcons.xml"] = terminals.terminals(mechanism)
+        xml["terminalsAndIcons/terminalsAndIcons.xml"] = writer.terminals(mechanism)
     for name, text in xml.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(text)
@@ -415,7 +414,7 @@ def members(xml: bytes) -> Iterator[tuple[str, str, str]]:
 
 def test_terminals_gather_what_is_connected_together(model: Model) -> None:
     found: dict[str, dict[str, str]] = {}
-    for terminal, member, variable in members(terminals.terminals(FMUS[model.name])):
+    for terminal, member, variable in members(writer.terminals(FMUS[model.name])):
         found.setdefault(terminal, {})[member] = variable
     assert found == TERMINALS[model.name]
 
@@ -434,12 +433,12 @@ def test_further_files_of_fmi_3_follow_their_schemas(mechanism: Mechanism, name:
     schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / SCHEMAS[name]))
     schema.assertValid(etree.parse(str(folder / name)))
     variables = set(scalars(root_of((folder / "modelDescription.xml").read_bytes())))
-    for _, _, variable in members(terminals.terminals(mechanism)):
+    for _, _, variable in members(writer.terminals(mechanism)):
         assert variable in variables
 
 
 def test_terminals_have_kinds_flows_and_icons(model: Model) -> None:
-    files = terminals.terminal_files(FMUS[model.name])
+    files = writer.terminal_files(FMUS[model.name])
     listed = root_of(files["terminalsAndIcons/terminalsAndIcons.xml"]).find("Terminals")
     kinds = {terminal.get("name"): terminal.get("terminalKind").rpartition(".")[2] for terminal in listed}
     assert (
