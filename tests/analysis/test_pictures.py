@@ -313,7 +313,9 @@ class _Motion(SimpleNamespace):
 
 
 def test_basins_name_the_motion_that_a_start_ends_in() -> None:
-    flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2, period=2.0 * np.pi, ways=np.zeros(2))
+    flow = SimpleNamespace(
+        components=(("q", "m"), ("q'", "m/s")), size=2, period=2.0 * np.pi, angle_periods=np.zeros(2)
+    )
     motions = [
         _Motion(
             start=np.array([0.1 * n, 0.0]),

@@ -179,7 +179,7 @@ def test_the_least_force_of_a_path() -> None:
     assert free.value < 0.0025
     found = syn.synthesize(task, constraints=[*USUAL, syn.LeastPinForce(error=0.003, make=MAKE)], search=one).best
     # the bound is used, and what it buys is much
-    assert found.value == pytest.approx(0.003, rel=1e-3)
+    assert found.value == pytest.approx(0.003, rel=2e-3)
     assert found.value <= 0.003 * (1.0 + 1e-4)
     assert syn.pin_forces(found.linkage, MAKE).greatest < 0.8 * syn.pin_forces(free.linkage, MAKE).greatest
 
@@ -235,7 +235,7 @@ class TestRefused:
 
 
 def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
-    tables = {
+    tables: dict[str, Any] = {
         "task": {"kind": "rocker-function", "angle": "30 + 10*sin(t)", "angle_unit": "deg", "n": 12},
         "constraints": {
             "least_mechanical_advantage": 1.5,
@@ -265,7 +265,9 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="come with least_mechanical_advantage"):
         syn.read_synthesis_case(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
     swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
-    *_, toggle, other = syn.read_synthesis_case(tables | {"constraints": swing}, folder=tmp_path).constraints
+    # a crank that comes to a toggle does not make a whole turn
+    part = {"task": tables["task"] | {"end": "240 deg"}, "constraints": swing}
+    *_, toggle, other = syn.read_synthesis_case(tables | part, folder=tmp_path).constraints
     assert isinstance(toggle, syn.Toggle)
     assert isinstance(other, syn.Toggle)
     assert (toggle.position, other.position) == ("stretched", "folded")

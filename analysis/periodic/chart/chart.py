@@ -42,6 +42,7 @@ from ..motion import (
     speed_names,
 )
 from ..response import distance, natural_frequency, oscillating_freedoms
+from ..response.branch import motion_sizes
 from ..stability import Confirmation, SpecialPoint, confirm
 from .boundary import (
     BRANCH_POINTS,
@@ -61,7 +62,8 @@ _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 LINES, SAMPLES = (2, 5), 120
 #: Extent, relative to the chart's ranges, below which a boundary that could not be followed to its end is not drawn.
 STUB = 1e-3
-#: Distance of two starts, relative to the scale of y, below which neighbours on a grid belong to one motion.
+#: Distance of two starts, relative to the scale of y or to the size of small motions, below which neighbours on a grid belong
+#: to one motion.
 SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
@@ -489,7 +491,7 @@ class _Survey:
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Return whether a traced boundary of the same kind and motion passes through, or close to, a special point."""
         orbit = special.orbit
-        scale = orbit.scale
+        scale = orbit.scale * motion_sizes([orbit])
         for boundary in self.traced:
             if boundary.kind is not special.kind or boundary.motion not in _MOTION:
                 continue
@@ -592,7 +594,7 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 
     This is so if the orbit's start is near the start of an orbit at one of the grid points around ``place``.
     """
-    scale = orbit.scale
+    scale = orbit.scale * motion_sizes([orbit])
     distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
 

@@ -286,7 +286,7 @@ def switch(
         orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
     )
     follower = _follower(family, begun, settings)
-    follower.scale[:-1] *= _sizes([orbit])
+    follower.scale[:-1] *= motion_sizes([orbit])
     # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy - (-1.0) ** (times - 1) * np.eye(len(scale))) * scale / scale[:, None]
@@ -303,7 +303,7 @@ def switch(
     raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
 
 
-def _sizes(orbits: Sequence[PeriodicOrbit]) -> NDArray[np.float64]:
+def motion_sizes(orbits: Sequence[PeriodicOrbit]) -> NDArray[np.float64]:
     """Return for each component of y how large motions are, relative to the scale: thirty times the amplitude, 1 at most.
 
     Motions may be much smaller than the links that give the scale.
@@ -569,7 +569,7 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
     parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
-    scale = np.append(np.max([o.scale for o in ends], axis=0) * _sizes(branch.orbits), width)
+    scale = np.append(np.max([o.scale for o in ends], axis=0) * motion_sizes(branch.orbits), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     away = ends[0].flow.remove_turns(points[:, :-1] - motion)
     near = np.abs(away / scale[:-1]).max(axis=1).argmin()
