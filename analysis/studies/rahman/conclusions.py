@@ -78,7 +78,7 @@ def conclusions() -> StudyResult:
         f"the {len(ended)} cases out of the plane in the figures for which the printed iteration closes the loop at every 30 "
         "deg, starting from the planar estimate"
     )
-    all_closed = f"all of them; a loop counts as closed up to {NOTHING:g}"
+    all_closed = f"all of them; a loop counts as closed up to {NOTHING:g} rad, for rounding errors"
     closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     place = text("section 3.3, L1131")

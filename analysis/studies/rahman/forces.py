@@ -237,7 +237,7 @@ def _momenta() -> tuple[Statement, ...]:
             "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
             text("section 2.8, eqs 52a, 53a, L744-748"),
             f"difference from the binors times the velocities of eqs 36 and 32a, in a general position with g3 = {G3:g} in "
-            "in 53a and 0 in 52a (L1089)",
+            "for eq 53a and 0 for eq 52a (L1089)",
             ROUNDING,
             (
                 nothing("eq 52a", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),

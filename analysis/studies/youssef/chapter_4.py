@@ -275,7 +275,10 @@ def compute_second() -> StudyResult:
         }
         for n in (slice(2, 3), slice(3, None))
     )
-    first, second = ([resonance(chapter_4(r), harmonic=n)[1] for r in INERTIA_RATIOS] for n in (1, 2))
+    below = {
+        word: [OMEGA_K / n - resonance(chapter_4(r), harmonic=n)[1] for r in INERTIA_RATIOS]
+        for n, word in ((1, "first"), (2, "second"))
+    }
     return StudyResult(
         number="4.4",
         claim="Second harmonic over the crank speed without damping, for three inertia ratios.",
@@ -286,17 +289,14 @@ def compute_second() -> StudyResult:
                 "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
-                "greatest root of the determinant of (4.33) by the right equation at I4 = 0.5, 1 and 1.5, the upper of the "
-                "two neighbouring roots at each resonance; change of this root from each I4 to the next",
-                SIGN,
+                "distance below omega_k, or below omega_k/2, of the upper of the two neighbouring roots of the determinant of "
+                "(4.33) by the right equation, at I4 = 0.5, 1 and 1.5: the least; then the greatest divided by the least",
+                f"{SIGN}; more than {1.0 + ALIKE:g}, the rule for *the same*, as *depends* says",
                 (
-                    at_most("root of the first harmonic", OMEGA_K, max(first), "rad/s"),
-                    at_most("root of the second harmonic", 0.5 * OMEGA_K, max(second), "rad/s"),
+                    *(at_least(f"{word} harmonic, least", 0.0, min(x), "rad/s") for word, x in below.items()),
                     *(
-                        at_most(
-                            f"change of the root with I4, {word} harmonic, greatest", 0.0, np.diff(x).max(), "rad/s"
-                        )
-                        for word, x in (("first", first), ("second", second))
+                        at_least(f"{word} harmonic, greatest over least", 1.0 + ALIKE, max(x) / min(x))
+                        for word, x in below.items()
                     ),
                 ),
             ),

@@ -162,8 +162,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "As is clearly seen the region is narrow and its width increases with increase of I4.",
             text("5.3.1, L3762-3764; the same in L3944-3946"),
-            "greatest width of the region relative to its middle; least growth of the width from one I4 to the next; for "
-            "the true periodic motion",
+            "greatest width of the region in lambda_k^2 relative to its middle; least growth of the width from one I4 to the "
+            "next; for the true periodic motion",
             f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {SIGN}",
             (
                 at_most("width", SMALL, (widths(true) / (middles + 0.25)).max()),

@@ -119,15 +119,15 @@ def family() -> StudyResult:
                 "If, however, a second input is established to which a controller is attached the output may be modified, "
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
-                f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2): "
-                f"the greatest for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (our choice) at the {PRECISION} precision "
-                "points, where u = 0; and the same in that part between two of them in which it is least",
+                f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2) "
+                f"for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3: the greatest at the {PRECISION} precision points, where "
+                "u = 0 (all our choice); then the greatest between each two of them, of which the least is listed",
                 f"1e-12 l3, for rounding errors; more than {READ:g} l3, the accuracy to which a graph can be read",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),
                     at_least("between the precision points", READ, changed, "l3"),
                 ),
-                "the variety is infinite, since a may have any value",
+                f"the variety is infinite, since a may have any value from {BETWEEN[0]:g} to {BETWEEN[-1]:g} l3",
             ),
             Statement(
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "

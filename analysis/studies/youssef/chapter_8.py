@@ -380,7 +380,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "there the third and the fourth harmonic meet the natural frequency",
         ),
         Statement(
-            "This suggested a slider solution based on the first and second harmonics, and that the third and higher "
+            "This suggested a slider solution based on the first and second[] harmonics, and that the third and higher "
             "harmonics are small in comparison.",
             text("8.4.1.2, L6774-6779"),
             "greatest of the harmonics 3 to 6, relative to the greater of the first and second: the most and the least at "

@@ -150,7 +150,11 @@ def undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: fl
     )
 
 
-#: The tolerance of `damper_cases`.
+#: What `damper_cases` measures, and its tolerance.
+UNDAMPED = (
+    "greatest mean crank speed of a turn, relative to that of the first turn, without the damper and with it, in the second "
+    "half of the turns that both motions have"
+)
 LOSS = f"{ALIKE_WORDS}; a loss is more than that, and lasts"
 
 
@@ -226,8 +230,8 @@ def _free_causes() -> Statement:
         text("3.3, L2253-2259"),
         "*the non-linearities* are read as the change of the inertia with the position. First the relative range of the "
         f"kinetic energy in a turn divided by that of the crank speed squared, the greatest down to {HARMONIC_SPEED:g} "
-        "rad/s: this is the part of the oscillation that they do not explain. Then the greatest mean speed of a turn in the "
-        "second half of 4 s (our choice), relative to that of the first turn, without the damper and with it, as at Fig 3.6",
+        f"rad/s: this is the part of the oscillation that they do not explain. Then the {UNDAMPED}, which are followed for 4 s "
+        "and for 10 s (our choice)",
         f"at most half, as *due to* says; {LOSS}",
         (*swings, *damper_cases(undamped, 0.0)),
         undamped_range(undamped, 0.0),

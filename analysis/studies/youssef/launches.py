@@ -23,7 +23,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
-from .free_crank import LOSS, SAMPLES, SOFT, STIFF, Turns, coast, damper_cases, turn_by_turn, undamped_range
+from .free_crank import LOSS, SAMPLES, SOFT, STIFF, UNDAMPED, Turns, coast, damper_cases, turn_by_turn, undamped_range
 from .runs import (
     ALIKE_WORDS,
     SIGN,
@@ -223,14 +223,10 @@ def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
     return free, damped
 
 
-#: What is measured by `_swing_cases` and `damper_cases`.
+#: What is measured by `_swing_cases`.
 SWINGS = (
     "range of the crank speed in a turn divided by its mean; for the decay, the mean relative to that of the turn before. "
     "Free motions"
-)
-UNDAMPED = (
-    "greatest mean crank speed of a turn in the second half of the free motion, relative to that of the first turn, without "
-    "the damper and with it, over the turns that both motions have"
 )
 
 
@@ -284,7 +280,7 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED}; runs of 3 s (our choice)",
+            f"{UNDAMPED} in 3 s (our choice)",
             LOSS,
             damper_cases(undamped, 1.0),
             undamped_range(undamped, 1.0),
@@ -419,9 +415,7 @@ def launch_speeds_by_spring() -> StudyResult:
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            "least range of the crank speed in a turn divided by its mean, up to 1 s; greatest mean speed of a turn in the "
-            "second half of 3 s (our choice), relative to that of the first turn, without the damper and with it, as at Fig "
-            "3.6",
+            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} in 3 s (our choice)",
             LOSS,
             (_swing_cases(_spring_runs(), 1.0)[0], *damper_cases(undamped, 1.0)),
             undamped_range(undamped, 1.0),

@@ -359,9 +359,9 @@ def _simplification() -> list[Statement]:
             "side may be written : [(4.27)]",
             text("4.3, eqs (4.22) to (4.28), L2853-2916"),
             f"order in sigma2 (which we take for epsilon) of the error of (4.23) to (4.28), from sigma2 = {SHORT[0]:g} to "
-            f"{SHORT[1]:g} at I4 = 1. The error is the difference from the exact quotients by D1 + E1 cos + F1 sin in "
-            "(4.21): S, the factor of damper and spring, K and F. (4.21) is taken as printed, with the sign of H1 for P1; "
-            "b4 has k3 k6 + k4 k5, as in the listing (L8448)",
+            f"{SHORT[1]:g} at I4 = 1. The error is the difference from the exact quotients of (4.21) by D1 + E1 cos + "
+            "F1 sin, which are S (the factor of damper and spring), K and F. (4.21) is taken as printed, with the sign of H1 "
+            "for P1; b4 has k3 k6 + k4 k5, as in the listing (L8448)",
             "order 3; 0.05, since an order is a whole number",
             tuple(
                 at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too, which is left out")
