@@ -12,6 +12,9 @@ from .parameters import Drive, Interface, needs_turns
 from .structure import sliders
 from .writing import quote
 
+#: Greatest number of steps of the default experiment of an FMU.
+_MOST_STEPS = 100_000
+
 
 class Start(NamedTuple):
     """A field of the initial state: its name and unit, its value in the description, and its default."""
@@ -135,8 +138,8 @@ class Variables:
         """Return the default experiment of the FMU: start, stop and step (s), tolerance.
 
         It takes three turns of the slowest crank that turns at the start, about as many as two digits can say, in steps of at
-        most one degree of the fastest crank; 1 s in steps of 1 ms if no crank turns. Angles without a drive, such as that of a
-        pendulum on a crank, count only if no other angle moves.
+        most one degree of the fastest crank, but at most `_MOST_STEPS` steps; 1 s in steps of 1 ms if no crank turns. Angles
+        without a drive, such as that of a pendulum on a crank, count only if no other angle moves.
         """
         moving = [d for d in self.interface.drives if d.turns and d.speed]
         turns = [2.0 * pi / abs(d.speed) for d in [d for d in moving if d.table] or moving]
@@ -144,7 +147,7 @@ class Variables:
             return 0.0, 1.0, 1e-3, 1e-9
         power = 10.0 ** floor(log10(min(turns) / 360.0))
         step = max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= min(turns) / 360.0 or digit == 1.0)
-        return 0.0, float(f"{3.0 * max(turns):.2g}"), float(f"{step:.1g}"), 1e-9
+        return 0.0, float(f"{min(3.0 * max(turns), _MOST_STEPS * step):.2g}"), float(f"{step:.1g}"), 1e-9
 
     def origins(self) -> Iterator[str]:
         """Yield the entries that say where the mass properties come from."""

@@ -670,6 +670,13 @@ def test_a_pendulum_on_the_crank_does_not_prolong_the_default_experiment() -> No
     assert built.mechanism().experiment[1] == pytest.approx(0.6)
 
 
+def test_the_default_experiment_of_very_different_cranks_has_an_end() -> None:
+    built = linkage("slow-and-fast", ground={"A": (0, 0), "B": (1, 0)})
+    for body, pin, speed in (("slow", "A", "1 rpm"), ("fast", "B", "10000 rpm")):
+        built.body(body, points={pin: (0, 0)}, mass=1.0, inertia=0.1).drive(body, pin, speed=speed)
+    assert built.mechanism().experiment == (0.0, pytest.approx(1.0), pytest.approx(1e-5), 1e-9)
+
+
 def test_the_builder_refuses_a_name_given_twice() -> None:
     with pytest.raises(InputError, match=r"already has springs\.wind"):
         wheel("twice", stiffness=1.0).spring("wind", at="Q", damping=1.0)
