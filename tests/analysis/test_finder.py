@@ -113,7 +113,7 @@ def test_two_motions_of_a_symmetric_machine_are_found_where_newtons_method_mostl
     rig = variant(duffing(0.1), rotor_cog_x=1.0, spring_damping=1.5)
     found = find_orbits(rig, speed=30.03)
     first, second = found.stable
-    mirrored = -second.sample(np.array([pi]))[0, list(second.flow.places)]
+    mirrored = -second.sample(pi)[0, list(second.flow.places)]
     assert mirrored == pytest.approx(first.start, rel=1e-6)
     assert (found.agreed, len(found)) == (True, 3)
 

@@ -340,17 +340,18 @@ class PeriodicOrbit(NotebookResult):
         """Return the verdict on stability: whether small deviations die out, and with what margin; see `floquet.verdict`."""
         return verdict(self.multipliers, tolerance)
 
-    def sample(self, angles: FloatArray) -> FloatArray:
+    def sample(self, angles: ArrayLike) -> FloatArray:
         """Return the state of a run and the channels at increasing crank angles (rad), shape (m, states + inputs).
 
         Raises OrbitError if the integration fails.
         """
-        rows = np.empty((len(angles), self.point.mechanism.size + self.flow.inputs))
+        places = np.array(angles, dtype=float, ndmin=1)
+        rows = np.empty((len(places), self.point.mechanism.size + self.flow.inputs))
         stations, starts = (np.zeros(1), self.start[None, :].copy())
         if self.stations is not None:
             stations, starts = self.stations.angles[:-1].copy(), self.stations.starts
         section = self.point.section(self.start, PLAIN, STATE)
-        status = kernels.sample(section, stations, starts, angles, rows)
+        status = kernels.sample(section, stations, starts, places, rows)
         if status != Status.DONE:
             raise orbit_error(status, self.flow, self.start)
         return rows
