@@ -406,8 +406,7 @@ def _path(orbit: PeriodicOrbit) -> FloatArray:
     """Return samples of y over the period, shape (m, n), with angles that begin at most half a turn from `Flow.rest`."""
     flow, n = orbit.flow, SAMPLES * orbit.turns
     y = orbit.sample(np.linspace(0.0, flow.period * orbit.turns, n, endpoint=False))[:, list(flow.places)]
-    whole = np.divide(y[0] - flow.rest, flow.angle_periods, out=np.zeros(flow.size), where=flow.angle_periods > 0.0)
-    return np.asarray(y - flow.angle_periods * np.round(whole))
+    return np.asarray(y - flow.whole_turns(y[0] - flow.rest))
 
 
 def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:

@@ -231,9 +231,8 @@ def grid(
 
 
 def _compute_row(guesses: FloatArray, tolerance: float, rows: Sequence[PointRow]) -> FloatArray:
-    """Compute a row of a grid, shape (1, m, n + 2): largest multiplier, start and status of the orbit at each point."""
-    values, starts, status = _solve_row(rows[0], guesses, tolerance)
-    return np.column_stack([values, starts, status])[None]
+    """Compute rows of a grid, shape (rows, m, n + 2): largest multiplier, start and status of the orbit at each point."""
+    return np.array([np.column_stack(_solve_row(row, guesses, tolerance)) for row in rows])
 
 
 # The operating points of a row in arrays, for the kernels that solve the row

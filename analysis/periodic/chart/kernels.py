@@ -330,9 +330,8 @@ class Seekers(NamedTuple):
     place: NDArray[np.int64]  # index of the start from which the lane's search began
     polishing: NDArray[np.bool_]  # whether Newton's method now refines a motion at the full tolerance
     hunts: Hunt  # states of Newton's method: each array has a row for each lane
-    point: NDArray[
-        np.int64
-    ]  # column of the point at which a row is searched; this and the following: one entry per row
+    # each of the following has an entry for each row
+    point: NDArray[np.int64]  # column of the point at which the row is searched
     guessing: NDArray[np.bool_]  # whether the wave begins at guesses
     begun: NDArray[np.int64]  # number of motions that were known when the wave began
     left: NDArray[np.int64]  # number of searches of the wave that have not ended

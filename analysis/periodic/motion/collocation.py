@@ -31,9 +31,8 @@ from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, p
 from ...numerics.gauss import gauss
 from ...numerics.references import refer
 from ...numerics.vectors import LANES, absolute, greater, load, multiply_add, store
-from ...run.compiled import write_lane
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, VARIATIONAL
-from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room
+from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room, write_mechanism
 
 #: Nodes of an element.
 NODES = 12
@@ -136,9 +135,7 @@ def lay_elements(angles, desk):
 def _set_mechanism(section, desk):
     """Write the mechanism and the drive of a section into all lanes."""
     for lane in range(LANES):
-        write_lane(lane, LANES, section.modes, desk.modes)
-        write_lane(lane, LANES, section.drive, desk.drive)
-        write_lane(lane, LANES, section.p, desk.p)
+        write_mechanism(lane, section, desk)
 
 
 @inner

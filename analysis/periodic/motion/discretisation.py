@@ -303,8 +303,7 @@ def growth_factors(matrices: FloatArray, scale: FloatArray) -> FloatArray:
 
     ``matrices`` are those of `Ends`; deviations are measured in units of ``scale``, the scale of y.
     """
-    growth_factors: FloatArray = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
-    return growth_factors
+    return np.asarray(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)))
 
 
 def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:

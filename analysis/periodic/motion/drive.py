@@ -652,16 +652,16 @@ def assembly_ranges(
     return sides[0], sides[1]
 
 
-def _slow_distances(
-    parameters: Parameters, drive: Drive, guess: NDArray[np.float64], distances: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Reduce distances of the free coordinates from rest to those at which free vibrations are not too fast: see `_FASTEST`.
+def start_ranges(
+    parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the bounds of `assembly_ranges`, reduced to where free vibrations are not too fast: see `_FASTEST`.
 
     Under a spring that becomes much stiffer there are no periodic motions far away, and integrations from there take very long.
     """
-    mechanism = find_mechanism(parameters)
-    flow, vector, constants = drive.flow(mechanism), drive.vector(mechanism), np.array(parameters.constants())
-    rates = flow.function(PLAIN, mechanism.is_switched_on(parameters.constants()))
+    mechanism, p = find_mechanism(parameters), parameters.constants()
+    flow, vector, constants = drive.flow(mechanism), drive.vector(mechanism), np.array(p)
+    rates = flow.function(PLAIN, mechanism.is_switched_on(p))
     numbers = (flow.modes, np.append(vector, np.zeros_like(vector)), np.append(constants, np.zeros_like(constants)))
     pace, n, half = drive.speed or guess[-1], flow.size, flow.size // 2
 
@@ -673,15 +673,16 @@ def _slow_distances(
         slopes = [float(rates(0.0, z, *numbers)[half + place]) for z in y]
         return float(abs((slopes[1] - slopes[0]) / (away * pace)))
 
-    found = distances.copy()
-    for i, away in enumerate(distances.tolist()):
-        most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
-        # a bound may lie a step beyond the limit of assembly, where there are no accelerations
-        inside = away if isfinite(square(i, away)) else away / _WIDER
-        while square(i, inside) > most and abs(inside) > 1e-3 * abs(away):
-            inside /= _WIDER
-            found[i] = inside
-    return found
+    low, high = assembly_ranges(parameters, drive, guess)
+    for bound in (low, high):
+        for i, away in enumerate((bound - flow.rest[:half]).tolist()):
+            most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
+            # a bound may lie a step beyond the limit of assembly, where there are no accelerations
+            inside = away if isfinite(square(i, away)) else away / _WIDER
+            while square(i, inside) > most and abs(inside) > 1e-3 * abs(away):
+                inside /= _WIDER
+                bound[i] = flow.rest[i] + inside
+    return low, high
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -691,7 +692,12 @@ def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
 
 
 def spread_starts(
-    parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
+    parameters: Parameters,
+    drive: Drive,
+    guess: NDArray[np.float64],
+    count: int,
+    number: int = 0,
+    ranges: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
     """Return starts with many amplitudes and phases, by a scrambled Sobol sequence; shape (3/2 count or 5/2 count, n).
 
@@ -708,16 +714,15 @@ def spread_starts(
         Number of starts in an ellipse, a power of two.
     number : int
         Index of the set of starts, which is the seed of the sequence: each index gives other starts.
+    ranges : tuple of ndarray, optional
+        Result of `start_ranges`, for callers that take several sets.
     """
     from scipy.stats import qmc  # takes half a second
 
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
     rest = flow.rest[:half]
-    low, high = (
-        rest + _slow_distances(parameters, drive, guess, side - rest)
-        for side in assembly_ranges(parameters, drive, guess)
-    )
+    low, high = start_ranges(parameters, drive, guess) if ranges is None else ranges
     around = mean_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
     own = np.minimum(rest - low, high - rest)

@@ -249,13 +249,14 @@ class Flow:
 
     def remove_turns(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return differences of y, shape (..., n), with whole turns of angles removed."""
-        return away - self._whole(away)
+        return away - self.whole_turns(away)
 
     def nearest_to_rest(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return y with its angles changed by whole turns so that they are nearest to `rest`."""
-        return y - self._whole(y - self.rest)
+        return y - self.whole_turns(y - self.rest)
 
-    def _whole(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+    def whole_turns(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the whole turns of angles in differences of y, shape (..., n)."""
         whole: NDArray[np.float64] = self.angle_periods * np.round(
             away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0)
         )

@@ -24,6 +24,8 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ...numerics.continuation import NOISE
+from ...numerics.vectors import LANES
+from ...run.compiled import write_lane
 from ...run.stepping import (
     NODES,
     STAGES,
@@ -91,6 +93,14 @@ def replace_numbers(section, drive, p, scale, tolerance):
     return Section(
         section.equations, section.modes, drive, p, scale, section.angle_periods, 1.0, tolerance, section.torque
     )
+
+
+@inner
+def write_mechanism(lane, section, work):
+    """Write the modes, the drive and the constants of a section into one lane of those of a work space in lanes."""
+    write_lane(lane, LANES, section.modes, work.modes)
+    write_lane(lane, LANES, section.drive, work.drive)
+    write_lane(lane, LANES, section.p, work.p)
 
 
 class Room(NamedTuple):

@@ -26,7 +26,7 @@ from ...mechanisms import InitialState, Parameters, find_mechanism
 from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
-from .drive import SAME, Drive, Torque, mean_rates, spread_starts, steady_drive
+from .drive import SAME, Drive, Torque, mean_rates, spread_starts, start_ranges, steady_drive
 from .floquet import Stability
 from .kernels import Status
 from .orbit import (
@@ -514,7 +514,8 @@ def _search_rounds(
     """Find the periodic motions in which undriven links with a ratio in the drive go round, and other links only swing."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
-    many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
+    ranges = start_ranges(point.parameters, point.drive, guess)
+    many, deflated = (_FoundMotions(point, turns, guess, ranges) for _ in range(2))
     whole = 0 if point.flow.angle_periods.any() else 1
     for orbit in known:
         many.add(orbit)
@@ -564,8 +565,11 @@ def join_orbits(parts: Sequence[Orbits]) -> Orbits:
 class _FoundMotions:
     """The motions found at an operating point by one of the two methods of the search."""
 
-    def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
+    def __init__(
+        self, point: OperatingPoint, turns: int, guess: FloatArray, ranges: tuple[FloatArray, FloatArray]
+    ) -> None:
         self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
+        self._ranges = ranges
         self.orbits: list[PeriodicOrbit] = []
         #: Starts of all motions, one for each turn of a motion; motions of shorter periods are included.
         self.known = np.empty((0, len(guess)))
@@ -576,7 +580,7 @@ class _FoundMotions:
 
     def places(self, count: int, number: int) -> list[FloatArray]:
         """Return the starts in the set with the index ``number``: see `spread_starts`."""
-        return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number))
+        return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number, self._ranges))
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
         """Return whether a start belongs to a known motion, within a distance of ``near`` relative to the scale of y."""

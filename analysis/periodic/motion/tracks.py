@@ -20,7 +20,7 @@ from ...run.compiled import write_lane
 from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
-from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, passes_kink, start_piece
+from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, passes_kink, start_piece, write_mechanism
 
 #: Status of a lane whose motion has not ended, and of a lane without a motion; a motion ends with a `Status`.
 RUNNING, IDLE = -1, -2
@@ -73,9 +73,7 @@ def make_tracks(section, columns):
 def set_mechanism(lane, section, v):
     """Write the mechanism and the drive of a lane, and the magnitudes of z."""
     scale, n = section.scale, section.scale.shape[0]
-    write_lane(lane, LANES, section.modes, v.modes)
-    write_lane(lane, LANES, section.drive, v.drive)
-    write_lane(lane, LANES, section.p, v.p)
+    write_mechanism(lane, section, v)
     for i in range(n):
         v.z[i] = scale[i]
         for j in range(v.z.shape[0] // n - 1):
