@@ -30,7 +30,7 @@ from linkwork.plant import Plant
 
 from ..mechanisms import MECHANISMS
 from ..numerics.cache import code_folder, load_or_make
-from ..run import ALLOWED, EXPERIMENTS, LEAST_SCALE, MANIFEST, STANDARD, Case, input_sampler, standard_cases
+from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, deviation_scales, input_sampler, standard_cases
 from .bill import BILL, TYPE
 from .description import layered_standard, to_xml_bytes
 
@@ -222,12 +222,9 @@ def _result_units(mechanism: Mechanism) -> list[str]:
 
 def _deviations(mechanism: Mechanism, found: list[list[float]], reference: list[list[float]]) -> NDArray[np.float64]:
     """Return for each row of results the largest relative difference from a reference, as `analysis.run.verify` measures it."""
-    units, wanted = np.array(_result_units(mechanism)), np.array(reference)[:, 1:]
-    sizes = np.abs(wanted).max(axis=0)
-    scale = np.maximum(sizes, LEAST_SCALE * np.array([sizes[units == unit].max() for unit in units]))
-    largest: NDArray[np.float64] = (np.abs(np.array(found)[:, 1:] - wanted) / np.where(scale > 0.0, scale, 1.0)).max(
-        axis=1
-    )
+    wanted = np.array(reference)[:, 1:]
+    scales = deviation_scales(wanted.T, _result_units(mechanism))
+    largest: NDArray[np.float64] = (np.abs(np.array(found)[:, 1:] - wanted) / scales).max(axis=1)
     return largest
 
 

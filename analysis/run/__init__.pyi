@@ -48,10 +48,10 @@ from .events import progress_listener as progress_listener
 from .events import show_progress as show_progress
 from .experiments import ALLOWED as ALLOWED
 from .experiments import EXPERIMENTS as EXPERIMENTS
-from .experiments import LEAST_SCALE as LEAST_SCALE
 from .experiments import MANIFEST as MANIFEST
 from .experiments import STANDARD as STANDARD
 from .experiments import ExperimentError as ExperimentError
+from .experiments import deviation_scales as deviation_scales
 from .experiments import read_experiments as read_experiments
 from .experiments import unpacking_folder as unpacking_folder
 from .experiments import verify as verify

@@ -13,7 +13,7 @@ import posixpath
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -347,21 +347,27 @@ def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
     return () if table is None else (table.dtype.names or ())[1:]
 
 
+def deviation_scales(columns: Iterable[NDArray[Any]], units: Sequence[str]) -> NDArray[np.float64]:
+    """Return the scale of each variable's differences from the columns of a reference.
+
+    It is the greatest magnitude, at least `LEAST_SCALE` of the greatest one of all variables with the same unit; 1 for zeros.
+    """
+    sizes, kinds = np.array([float(np.abs(column).max()) for column in columns]), np.array(units)
+    scales = np.maximum(sizes, LEAST_SCALE * np.array([sizes[kinds == unit].max() for unit in units]))
+    return np.where(scales > 0.0, scales, 1.0)
+
+
 def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str, str]) -> tuple[Deviation, ...]:
     """Return the largest difference of each variable at the times of the reference, sorted by relative size, largest first."""
     clock, *names = reference.dtype.names or ()
     times = reference[clock]
-    sizes = {name: float(np.abs(reference[name]).max()) for name in names}
-    of_unit: dict[str, float] = {}
-    for name, size in sizes.items():
-        of_unit[units[name]] = max(size, of_unit.get(units[name], 0.0))
+    scales = deviation_scales((reference[name] for name in names), [units[name] for name in names])
     deviations = []
-    for name in names:
+    for name, scale in zip(names, scales.tolist()):
         values = np.interp(times, found["time"], found[name].astype(float))
         difference = np.abs(values - reference[name])
         difference[np.isnan(difference)] = np.inf
         worst = int(np.argmax(difference))
-        scale = max(sizes[name], LEAST_SCALE * of_unit[units[name]]) or 1.0
         deviations.append(
             Deviation(
                 name=name,
