@@ -38,7 +38,7 @@ ALLOWED = "org.linkwork.allowed"
 #: Without that annotation: factor of the tolerance, and least value of their product; allowed difference without a tolerance.
 _FACTOR, _LEAST_ALLOWED, _DEFAULT_ALLOWED = 100.0, 1e-6, 1e-3
 #: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
-LEAST_SCALE = 1e-3
+_LEAST_SCALE = 1e-3
 
 
 class ExperimentError(LinkworkError):
@@ -350,10 +350,10 @@ def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
 def deviation_scales(columns: Iterable[NDArray[Any]], units: Sequence[str]) -> NDArray[np.float64]:
     """Return the scale of each variable's differences from the columns of a reference.
 
-    It is the greatest magnitude, at least `LEAST_SCALE` of the greatest one of all variables with the same unit; 1 for zeros.
+    It is the greatest magnitude, at least `_LEAST_SCALE` of the greatest one of all variables with the same unit; 1 for zeros.
     """
     sizes, kinds = np.array([float(np.abs(column).max()) for column in columns]), np.array(units)
-    scales = np.maximum(sizes, LEAST_SCALE * np.array([sizes[kinds == unit].max() for unit in units]))
+    scales = np.maximum(sizes, _LEAST_SCALE * np.array([sizes[kinds == unit].max() for unit in units]))
     return np.where(scales > 0.0, scales, 1.0)
 
 
