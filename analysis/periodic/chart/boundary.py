@@ -25,7 +25,7 @@ from linkwork.errors import InputError, LinkworkError
 from ...numerics.boundaries import Test, find_minimum
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
 from ..motion.discretisation import Discretisation, OrbitError, can_collocate, operating_point
-from ..motion.floquet import Crossing, crossing_test
+from ..motion.flow import Crossing, crossing_test
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
 from ..motion.variables import Family, Plane
 from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave

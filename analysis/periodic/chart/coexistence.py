@@ -21,8 +21,7 @@ from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, operating_point
 from ..motion.drive import Drive, assembly_ranges
-from ..motion.floquet import TOLERANCE, multipliers
-from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
+from ..motion.flow import GAP, IN_LANES, PLAIN, TOLERANCE, VARIATIONAL, Flow, multipliers
 from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane

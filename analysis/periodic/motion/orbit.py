@@ -41,8 +41,7 @@ from .discretisation import (
     orbit_error,
 )
 from .drive import Drive, mean_rates, spread_starts
-from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
-from .flow import PLAIN, STATE, VARIATIONAL, Flow
+from .flow import PLAIN, STATE, TOLERANCE, VARIATIONAL, Flow, StabilityVerdict, liouville, multipliers, verdict
 from .kernels import Status
 from .variables import Family
 

@@ -27,7 +27,7 @@ from ...run import Inputs, complete_initial_state, complete_inputs, takes_publis
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
 from .drive import SAME, Drive, Torque, mean_rates, spread_starts, start_ranges, steady_drive
-from .floquet import Stability
+from .flow import Stability
 from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,

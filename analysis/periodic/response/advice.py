@@ -21,7 +21,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ...numerics.peaks import peaks
 from ..motion.discretisation import OrbitError
-from ..motion.floquet import TOLERANCE, Crossing, Stability
+from ..motion.flow import TOLERANCE, Crossing, Stability
 from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family, parameter_value
 from ..stability.nonlinear import SpecialPoint

@@ -25,8 +25,7 @@ from ...files import write_csv
 from ...mechanisms import find_mechanism
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
 from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
-from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test, torus_pair
-from ..motion.flow import label
+from ..motion.flow import TOLERANCE, Crossing, Stability, crossing_test, label, torus_pair
 from ..motion.orbit import OrbitEquations, PeriodicOrbit, Turn
 from ..motion.variables import Family
 from ..stability.nonlinear import SpecialPoint

@@ -26,7 +26,7 @@ from ...mechanisms import Parameters
 from ...run import simulate, takes_published
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import Drive
-from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, torus_pair
+from ..motion.flow import TOLERANCE, Crossing, Stability, StabilityVerdict, torus_pair
 from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family
 

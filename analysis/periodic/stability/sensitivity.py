@@ -20,7 +20,7 @@ from linkwork.errors import InputError, LinkworkError
 from ...files import unknown_name
 from ...mechanisms import find_mechanism
 from ..motion.discretisation import operating_point
-from ..motion.floquet import Crossing
+from ..motion.flow import Crossing
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
 from ..motion.variables import (
     differentiate_constants,
