@@ -203,6 +203,8 @@ typedef struct {
     fmi2Component slave;
     fmi2CallbackFunctions master, own;
     bool logging, said; /* said: the slave has logged what is wrong, in the present call */
+    bool refused;       /* the last step */
+    double time;        /* of the last good step; not a number: not known */
     char *name, resources[LONGEST_PATH];
 } Guard;
 
@@ -392,7 +394,19 @@ CALL(SetupExperiment,
 CALL(EnterInitializationMode, (fmi2Component component), true)
 CALL(ExitInitializationMode, (fmi2Component component), true)
 CALL(Terminate, (fmi2Component component), true)
-CALL(Reset, (fmi2Component component), true)
+
+/* What PythonFMU would keep of the last step, beyond a reset or a state that is set. */
+static void forget_step(Guard *c) {
+    c->refused = false;
+    c->time = __builtin_nan("");
+}
+
+fmi2Status fmi2Reset(fmi2Component component) {
+    Guard *c = component;
+    if (!c) return refuse(c, "fmi2Reset: a null pointer");
+    forget_step(c);
+    return mild(next.Reset(begin(c)));
+}
 
 #define VALUES(name, type)                                                                                                     \
     CALL(name, (fmi2Component component, const fmi2ValueReference at[], size_t n, type values[]), !n || (at && values), at, n, \
@@ -425,7 +439,14 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *state) {
     return status;
 }
 
-CALL(SetFMUstate, (fmi2Component component, fmi2FMUstate state), state, state)
+fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate state) {
+    Guard *c = component;
+    if (!c || !state) return refuse(c, "fmi2SetFMUstate: a null pointer");
+    fmi2Status status = mild(next.SetFMUstate(begin(c), state));
+    if (status <= fmi2Warning) forget_step(c);
+    return status;
+}
+
 CALL(SerializedFMUstateSize, (fmi2Component component, fmi2FMUstate state, size_t *size), (state && size), state, size)
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
@@ -459,10 +480,28 @@ CALL(SetRealInputDerivatives,
 CALL(GetRealOutputDerivatives,
      (fmi2Component component, const fmi2ValueReference at[], size_t n, const fmi2Integer order[], fmi2Real values[]), true, at,
      n, order, values)
-CALL(DoStep, (fmi2Component component, fmi2Real time, fmi2Real step, fmi2Boolean no_return), true, time, step, no_return)
+
+fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real step, fmi2Boolean no_return) {
+    Guard *c = component;
+    if (!c) return refuse(c, "fmi2DoStep: a null pointer");
+    fmi2Status status = mild(next.DoStep(begin(c), time, step, no_return));
+    c->refused = status > fmi2Warning;
+    if (!c->refused || c->time != c->time) c->time = c->refused ? time : time + step;
+    return status;
+}
+
 CALL(CancelStep, (fmi2Component component), true)
 CALL(GetStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Status *value), value, kind, value)
-CALL(GetRealStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Real *value), value, kind, value)
 CALL(GetIntegerStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value), value, kind, value)
-CALL(GetBooleanStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Boolean *value), value, kind, value)
 CALL(GetStringStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2String *value), value, kind, value)
+
+#define STATUS(name, type, wanted, found)                                                                                      \
+    fmi2Status fmi2##name(fmi2Component component, const fmi2StatusKind kind, type *value) {                                   \
+        Guard *c = component;                                                                                                  \
+        if (!c || !value) return refuse(c, "fmi2" #name ": a null pointer");                                                   \
+        if (kind != (wanted)) return mild(next.name(begin(c), kind, value));                                                   \
+        *value = found;                                                                                                        \
+        return fmi2OK;                                                                                                         \
+    }
+STATUS(GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->time)
+STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, c->refused)

@@ -17,7 +17,15 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ..mechanisms import InitialState, Parameters, find_mechanism
-from ..run import Inputs, check_run, complete_initial_state, complete_inputs, start_ratio, takes_published
+from ..run import (
+    InductionMotor,
+    Inputs,
+    check_run,
+    complete_initial_state,
+    complete_inputs,
+    start_ratio,
+    takes_published,
+)
 from ..units import RAD_S_PER_RPM
 from .equilibrium import Equilibrium, find_equilibrium
 from .model import FloatArray, Matrices, evaluate, layout, sample_channels
@@ -178,7 +186,9 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int
     speeds[first] = speeds.get(first) or 1.0
     start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in cranks}
     begins = speeds[first] if commanded else start[first] or 1.0
-    motors = {c.freedom for c in mechanism.channels if c.kind == "force" and inputs.constants([c.argument]) is None}
+    motors = {
+        c.freedom for c in mechanism.channels for part in inputs.parts(c.argument) if isinstance(part, InductionMotor)
+    }
     return {n: float(start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
 
 

@@ -26,6 +26,7 @@ from analysis import (
     figures,
     frequency_response,
     natural_modes,
+    ramp,
     simulate,
     simulate_many,
     steps,
@@ -211,6 +212,8 @@ def test_rotors_on_motors_have_the_ratio_of_their_first_speeds_and_are_held_for_
         np.testing.assert_allclose(modes.frequencies, sqrt(K.k / K.mass), rtol=1e-3)
         turned = np.ptp([rest.coordinates[1] for rest in modes.equilibria])
         assert turned == pytest.approx(2.0 * pi * ratio * Fraction(ratio).denominator * 35 / 36)
+    with pytest.raises(InputError, match="constant"):  # a torque that varies in time is no motor
+        natural_modes(P, Inputs(left_speed=20.0, right_torque=ramp(0.0, 0.1, "0 s", "1 s")), initial=initial)
 
 
 def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:

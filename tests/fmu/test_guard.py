@@ -29,7 +29,7 @@ OTHERS = ["M\u00fcller", *(f"a{character}b" for character in "()#%+&@'")]
 _CALL = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from ctypes import byref, c_char, c_char_p, c_int, c_size_t, c_uint, c_void_p, memset
+from ctypes import byref, c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p, memset
 from bare_master import Fmu
 fmu = Fmu(*sys.argv[2:4])
 uri = (fmu.folder / "resources").as_uri()
@@ -122,6 +122,22 @@ os.chdir(fmu.folder / "binaries" / "linux64")
 fmu.library = CDLL(f"./{fmu.identifier}.so")
 os.chdir("/")
 fmu.instantiate().start()
+""",
+    "a step after a refused one": """
+i = fmu.instantiate().start()
+def last():
+    time = c_double()
+    assert i._call("GetRealStatus", c_int(2), byref(time)) == 0
+    return i.terminated(), time.value
+before = i.save()
+i.run([1e-3, 1e-3])
+assert i.step(2e-3, -1.0) == 2 and last() == ((0, 1), 2e-3)
+i.run([1e-3], 2e-3)
+assert last() == ((0, 0), 3e-3) and i.step(3e-3, -1.0) == 2
+assert i.restore(before) == 0 and i.terminated() == (0, 0)
+assert i.step(0.0, -1.0) == 2 and last() == ((0, 1), 0.0)
+assert i.reset() == 0 and i.start() and i.terminated() == (0, 0)
+assert i.step(0.0, -1.0) == 2 and last() == ((0, 1), 0.0)
 """,
     "no values": """
 i = fmu.instantiate().start()
