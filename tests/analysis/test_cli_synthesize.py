@@ -361,6 +361,26 @@ def test_rotations_in_equal_steps_or_as_a_list(tmp_path) -> None:
     np.testing.assert_allclose(case(points, tmp_path).task.rotation, np.radians([0.0, 10.0, 20.0, 50.0]))
 
 
+def test_the_end_of_a_turn_is_its_start(tmp_path) -> None:
+    whole, part = (f'rotation = {{ from = 0, to = "{end} deg" }}\n' for end in (360, 80))
+    repeated = [*json.loads(SQUARE), [0, 0]]
+    (tmp_path / "square.csv").write_text("\n".join(f"{x},{y}" for x, y in repeated))
+    timed, rocker = '[task]\nkind = "timed-path"\n', '[task]\nkind = "rocker-function"\nangle_unit = "deg"\n'
+    for text, expected in (
+        (ELLIPSE + whole, syn.turn(24)),
+        (f"{timed}{whole}points = {SQUARE}\n", syn.turn(4)),
+        (f"{timed}{whole}points = {repeated}\n", np.linspace(0.0, 2.0 * pi, 5)),
+        (f"{rocker}{whole}angle = [10, 30, 20]\n", syn.turn(3)),
+        (f"{rocker}{whole}angle = [10, 130, 250, 370]\n", np.linspace(0.0, 2.0 * pi, 4)),
+    ):
+        np.testing.assert_allclose(case(text, tmp_path).task.rotation, expected)
+    body = '[task]\nkind = "motion"\nangle = [0, 1, 2, 3, 4]\n'
+    for text in (timed + whole, timed + part, timed + "rotation = [0, 1, 2, 3, 4]\n", body, body + part):
+        assert case(text + 'file = "square.csv"\n', tmp_path).task.points.tolist() == repeated
+    opened = '[task]\nkind = "untimed-path"\nfile = "square.csv"\nclosed = false\n'
+    assert case(opened, tmp_path).task.path.points.tolist() == repeated
+
+
 def test_a_function_of_the_rocker_as_formula_list_and_file(tmp_path) -> None:
     phi = np.linspace(0.0, pi, 7)
     angle = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))

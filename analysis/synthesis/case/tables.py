@@ -75,6 +75,11 @@ class Steps:
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
 
+    @property
+    def is_turn(self) -> bool:
+        """Return whether the rotations span a whole turn."""
+        return abs(abs(self.end - self.begin) - tau) <= 1e-9
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
@@ -117,11 +122,17 @@ def _steps_or_list(value: Any, name: str) -> Any:
     return read(Steps, value, name) if isinstance(value, Mapping) else Many(Quantity("rad"))(value, name)
 
 
-def _rotation(value: Any, n: int) -> FloatArray | None:
-    """Return the crank rotations of n targets (rad) from `Steps` or a list; None if they are not given."""
-    if value is None:
-        return None
-    return np.linspace(value.begin, value.end, n) if isinstance(value, Steps) else np.array(value)
+def _rotation(value: Any, *targets: FloatArray) -> FloatArray | None:
+    """Return the crank rotations of targets (rad) from `Steps` or a list; None if they are not given.
+
+    ``targets`` are columns with a row for each target. The end of a whole turn is its start: it has a target of its own only if
+    the last target repeats the first.
+    """
+    if not isinstance(value, Steps):
+        return None if value is None else np.array(value)
+    rows = np.column_stack(targets)
+    repeated = bool(np.abs(rows[-1] - rows[0]).max() <= 1e-9 * np.ptp(rows, axis=0).max())
+    return np.linspace(value.begin, value.end, len(rows), endpoint=repeated or not value.is_turn)
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
@@ -243,10 +254,22 @@ class _Curve(_ObjectiveAndRange):
         else:
             path = path_from_formula(str(self.x), self.y, unit=self.unit or "m", **self._range())
             found, closed = path.points, path.closed
+        if source != "points" and closed and self.closed is False:
+            found = np.vstack([found, found[:1]])
         shift = np.zeros(2) if self.shift is None else read_plane_points([self.shift], "task.shift", self.unit)[0]
         if not (self.scale is None and self.turn is None and self.shift is None):
             found = transform_points(found, 1.0 if self.scale is None else self.scale, self.turn or 0.0, shift)
         return found, closed if self.closed is None else self.closed
+
+    def _timed_points(self, folder: Path, *given: Any) -> FloatArray:
+        """Return the points in m; the last point of a file, if it repeats the first, is one of them if what is given counts it.
+
+        ``given`` are crank rotations, as `Steps` or a list, and a list of angles; each may be None.
+        """
+        points, closed = self._target_points(folder)
+        n = len(points) + 1
+        counted = any(isinstance(one, Steps) or (one is not None and len(one) == n) for one in given)
+        return np.vstack([points, points[:1]]) if self.file is not None and closed and counted else points
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -257,8 +280,8 @@ class TimedPathTable(_Curve):
     weights: Any = entry(any_value, None)
 
     def task(self, folder: Path) -> Task:
-        points, _ = self._target_points(folder)
-        rotation = _rotation(self.rotation, len(points))
+        points = self._timed_points(folder, self.rotation)
+        rotation = _rotation(self.rotation, points)
         at = turn(len(points)) if rotation is None else rotation
         return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective)
 
@@ -317,12 +340,12 @@ class PrecisionPointsTable(_Curve):
 
     def _body(self, folder: Path) -> dict[str, Any]:
         """Return the arguments that `PrecisionPoints` and `Motion` share; the entry ``turn`` rotates both points and body."""
-        points, _ = self._target_points(folder)
-        rotation = _rotation(self.rotation, len(points))
         angle = None
         if self.angle is not None:
             angles = Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle")
             angle = np.array(angles) + (self.turn or 0.0)
+        points = self._timed_points(folder, self.rotation, angle)
+        rotation = _rotation(self.rotation, points)
         return {
             "points": points, "angle": angle, "rotation": rotation, "length": self.length, "objective": self.objective,
         }  # fmt: skip
@@ -380,7 +403,7 @@ class RockerFunctionTable(_ObjectiveAndRange):
             rotation, angle = read_points(folder / self.file, unit=self.angle_unit, si="rad")[0].T
         else:
             angle = np.array(Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle"))
-            rotation = _rotation(self.rotation, len(angle))
+            rotation = _rotation(self.rotation, np.cos(angle), np.sin(angle))
         at = turn(len(angle)) if rotation is None else rotation
         weights = _weights(self.weights, at)
         return RockerFunction(
@@ -411,7 +434,7 @@ class SliderFunctionTable(_ObjectiveAndRange):
         else:
             _refuse_entries(self, ("n", "start", "end"), "position as a formula")
             position = np.array(Many(Quantity("m", bare=self.unit))(self.position, "task.position"))
-            given = _rotation(self.rotation, len(position))
+            given = _rotation(self.rotation, position)
             rotation = turn(len(position)) if given is None else given
         weights = _weights(self.weights, rotation)
         return SliderFunction(position=position, rotation=rotation, weights=weights, objective=self.objective)
