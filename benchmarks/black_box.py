@@ -1,11 +1,11 @@
 """Synthesise four-bars by black-box searches: differential evolution, and the downhill simplex of the thesis.
 
-Neither method uses derivatives. `synthesize` is compared with both; chapter VI of the thesis has only the simplex.
+Neither method uses derivatives.
 
 The quality function is that of the task in normal form. For a path without crank rotations, it compares points of the path with
 points of the coupler curve at equal shares of the two lengths, in both directions of travel. A coupler curve that collapses
 onto a piece of the target, or makes detours, therefore has a large error. The constraints are those of the benchmarks: bounds,
-transmission angle, full turn, a straight part.
+transmission angle, full turn.
 
 If the links cannot be joined, they are stretched until they meet: C then lies on the line through B and D, where the circles of
 coupler and rocker have equal power, so that the quality stays continuous. The gap between the links is a violated constraint,
@@ -103,14 +103,6 @@ def evolve(
     )
 
 
-def descend(
-    box: BlackBox, random: np.random.Generator, score: Callable[[FloatArray], float] | None = None
-) -> OptimizeResult:
-    """Minimise a score, by default the penalised quality, by Nelder and Mead's simplex from the best of `DRAWS` linkages."""
-    draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
-    return minimise_score(box, draws[np.argmin(box.penalised_qualities(draws))], score or box.penalised_quality)
-
-
 def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
     """Minimise a score by Nelder and Mead's method from a regular simplex with its first vertex at the linkage ``first``.
 
@@ -181,8 +173,7 @@ class BlackBox:
         """Return the left sides g of the inequalities g(x) <= 0, shape (m, number of inequalities)."""
         q = self._linkages(x)
         # constraints over a whole turn do not need the stations' rotations, which take most of the time
-        needed = self.limits.turn is None or self.normal.straight is not None
-        rotation = self._rotations(x, q) if needed else np.zeros((len(q), 1))
+        rotation = self._rotations(x, q) if self.limits.turn is None else np.zeros((len(q), 1))
         return np.column_stack([value for _, value in self._inequalities(q, rotation)])
 
     def answer(self, result: OptimizeResult) -> Answer:
@@ -286,7 +277,7 @@ class BlackBox:
 
     def _inequalities(self, q: FloatArray, rotation: FloatArray) -> list[tuple[str, FloatArray]]:
         """Return the name and the left side g of each inequality g <= 0; each g has the shape (m,)."""
-        limits, normal = self.limits, self.normal
+        limits = self.limits
         l1, l2, l3, l4 = (q[:, k] for k in range(2, 6))
         found: list[tuple[str, FloatArray]] = []
         # least and greatest distance from crank pin to rocker pivot: over the whole turn, and over the rotations of the task
@@ -305,14 +296,4 @@ class BlackBox:
                 # converted to lengths, so that no constraint outweighs another
                 both = Linkage.transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
                 found += [("transmission angle", excess / (l3 + l4)) for excess in both]
-        straight = normal.straight
-        if straight is not None:
-            assert normal.points is not None
-            spent = np.abs(rotation[:, straight.end] - rotation[:, straight.start])
-            found.append(("crank rotation of the straight part", spent - straight.rotation))
-            if straight.flatness is not None:
-                line = normal.points[straight.end] - normal.points[straight.start]
-                traced = self._coupler_points(q, rotation, self._directions(q, rotation)[0])
-                off = (traced[:, straight.start : straight.end + 1] * line.conjugate()).imag / abs(line)
-                found.append(("flatness of the straight part", np.ptp(off, axis=1) - straight.flatness))
         return found

@@ -1,4 +1,4 @@
-"""Define synthesis problems in the form that all searches share, and the searches other than `synthesize`.
+"""Define targets of the race in the form that all searches share, and the searches other than `synthesize`.
 
 All searches have the same unknowns, bounds and constraints and the same measure: when a search improves, its clock is stopped
 and the linkage is evaluated by the task's own measure, unless it violates a constraint.
@@ -11,90 +11,66 @@ by its Nelder-Mead, as its manual advises. Its particle swarm takes no seed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from math import degrees, inf, log, pi, tau
-from time import perf_counter
+from math import inf, log, tau
+from time import process_time
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.numerics.overlap import symmetric_difference
-from analysis.studies.youssef.problems import AREA_N, PACKAGING_FLATNESS, PACKAGING_ROTATION, PACKAGING_TRAVEL, N
-from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
+from analysis.studies.youssef.problems import AREA_N, N
+from analysis.synthesis import Linkage, evaluate, normal_form, turn
 from analysis.synthesis.search.start import make_linkage
-from analysis.synthesis.task.constraint import Constraint
 from analysis.synthesis.task.limits import Limits, make_limits
-from analysis.synthesis.task.task import Normal, Task
+from analysis.synthesis.task.task import Normal
 
-from .black_box import DRAWS, PENALTY, BlackBox, descend, evolve, minimise_score
+from .black_box import DRAWS, PENALTY, BlackBox, evolve, minimise_score
+from .targets import Target
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Score = Callable[[FloatArray], float]
 
-#: Number of phases for which pylinkage's function generation is tried.
-PHASES = 360
 #: Least relative improvement of a score for which a linkage is measured, because measuring takes long.
 SLIGHT = 1e-4
 #: Number of population sizes of the evolution strategy, each twice the one before, until it starts again with the first.
 DOUBLED = 8
 
-# A problem, and the progress of a search
-
-
-class Problem(Protocol):
-    """A synthesis problem: one of chapter VI, or one of `targets.TARGETS`."""
-
-    @property
-    def task(self) -> Task: ...
-    @property
-    def bounds(self) -> Mapping[str, tuple[float, float]]: ...
-    @property
-    def constraints(self) -> tuple[Constraint, ...]: ...
-    def convert(self, error: float) -> float:
-        """Convert an error from SI to the reported unit."""
-        ...
+# A target, and the progress of a search
 
 
 class TimeUp(Exception):
-    """A search has used up its time, or reached its goal."""
+    """A search has used up its time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Contest:
-    """A problem in the form that all searches share.
-
-    For each assembly it has two `BlackBox`: one of the task (``boxes``), and one without the requirements for a straight part
-    (``plain``). A `BlackBox` checks these requirements at stations at equal shares of the length, where they are stricter than
-    in the task.
+    """A target in the form that all searches share, with a `BlackBox` for each assembly.
 
     With ``on_area``, searches for a path whose measure is the area first use stations at equal shares of the length, and then
     minimise the area itself.
     """
 
-    problem: Problem
+    target: Target
     normal: Normal
     limits: Limits
     boxes: tuple[BlackBox, ...]
-    plain: Mapping[int, BlackBox]
     on_area: bool
 
     @classmethod
-    def from_problem(cls, problem: Problem, *, on_area: bool = False) -> Contest:
-        """Return the contest for a problem."""
-        normal = normal_form(problem.task)
-        limits = make_limits(problem.task, normal, problem.bounds, problem.constraints)
+    def from_target(cls, target: Target) -> Contest:
+        """Return the contest for a target."""
+        normal = normal_form(target.task)
+        limits = make_limits(target.task, normal, target.bounds, target.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
-        plain = {branch: BlackBox(replace(normal, straight=None), limits, branch) for branch in limits.branches}
-        whole = normal.quality == "area" and normal.straight is None and not np.ptp(normal.outline_weights)
-        on_area = on_area and whole
-        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain, on_area=on_area)
+        return cls(target=target, normal=normal, limits=limits, boxes=boxes, on_area=normal.quality == "area")
 
     def area(self, curve: ComplexArray) -> float:
         """Return the area between a closed curve and the target, in squared units of the normal form."""
@@ -117,54 +93,32 @@ class Contest:
 
     def penalty(self, box: BlackBox, x: FloatArray) -> float:
         """Return the penalty to add to an area: `PENALTY` times the sum of the constraint violations."""
-        return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
+        return PENALTY * float(np.maximum(box.violations(x[None, :]), 0.0).sum())
 
     def error(self, box: BlackBox, x: FloatArray) -> float:
-        """Return the error by the task's own measure, in the reported unit; infinite if a constraint is violated."""
-        plain = self.plain[box.branch]
-        answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
-        linkage = make_linkage(answer.start, self.normal)
-        if not answer.feasible or (self.normal.straight is not None and not meets_packaging(linkage)):
-            return inf
-        return self.problem.convert(evaluate(self.problem.task, linkage).error)
-
-
-def meets_packaging(linkage: Linkage) -> bool:
-    """Return whether the coupler point has the travel and flatness that the packaging machine requires.
-
-    The required crank rotation is rounded to a degree.
-    """
-    x, y = linkage.path(turn(360)).T
-    window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
-    across, travel = y[window], np.abs(x[window] - x[:, None])
-    flatness = np.maximum.accumulate(across, axis=1) - np.minimum.accumulate(across, axis=1)
-    return bool(((flatness <= PACKAGING_FLATNESS) & (travel >= PACKAGING_TRAVEL)).any())
+        """Return the error by the task's own measure, in SI; infinite if a constraint is violated."""
+        answer = box.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
+        return evaluate(self.target.task, make_linkage(answer.start, self.normal)).error if answer.feasible else inf
 
 
 class Trace:
-    """The best error of a search as a function of its time; the clock is stopped while a linkage is measured.
+    """The best error of a search as a function of its processor time; the clock is stopped while a linkage is measured.
 
     Parameters
     ----------
     contest : Contest
     budget : float
         Time after which the search ends (s).
-    enough : float
-        Error at which the search ends, in the reported unit.
-    clock : callable
-        Function that returns the wall-clock or processor time (s).
     """
 
-    def __init__(
-        self, contest: Contest, budget: float, enough: float = -inf, clock: Callable[[], float] = perf_counter
-    ) -> None:
-        self.contest, self.budget, self.enough, self.clock = contest, budget, enough, clock
+    def __init__(self, contest: Contest, budget: float) -> None:
+        self.contest, self.budget = contest, budget
         self.points: list[tuple[float, float]] = []
-        self._begun, self._measuring = clock(), 0.0
+        self._begun, self._measuring = process_time(), 0.0
 
     @property
     def best(self) -> float:
-        """Least error so far, in the reported unit; infinite if there is none."""
+        """Least error so far, in SI; infinite if there is none."""
         return self.points[-1][1] if self.points else inf
 
     def tick(self) -> float:
@@ -175,26 +129,18 @@ class Trace:
         TimeUp
             If the time of the search is over.
         """
-        seconds = self.clock() - self._begun - self._measuring
+        seconds = process_time() - self._begun - self._measuring
         if seconds > self.budget:
             raise TimeUp
         return seconds
 
     def record_if_best(self, box: BlackBox, x: FloatArray) -> None:
-        """Measure a linkage, and record its error with the time if it is the least so far.
-
-        Raises
-        ------
-        TimeUp
-            If the linkage is good enough, or the time is over.
-        """
-        seconds, begun = self.tick(), self.clock()
+        """Measure a linkage, and record its error with the time if it is the least so far; raise `TimeUp` if time is over."""
+        seconds, begun = self.tick(), process_time()
         value = self.contest.error(box, x)
         if value < self.best:
             self.points.append((seconds, value))
-        self._measuring += self.clock() - begun
-        if value <= self.enough:
-            raise TimeUp
+        self._measuring += process_time() - begun
 
     def watch(self, box: BlackBox, score: Score) -> Score:
         """Wrap a function to be minimised: a linkage is measured whenever it improves the function by more than `SLIGHT`."""
@@ -213,12 +159,8 @@ class Trace:
         return value
 
     def least_error(self, seconds: float) -> float:
-        """Return the least error within a time (s), in the reported unit; infinite if nothing was found by then."""
+        """Return the least error within a time (s), in SI; infinite if nothing was found by then."""
         return min((value for passed, value in self.points if passed <= seconds), default=inf)
-
-    def reaching_time(self, error: float) -> float:
-        """Return the time (s) at which an error was reached; infinite if it was never reached."""
-        return next((seconds for seconds, value in self.points if value <= error), inf)
 
 
 # The other searches: each function makes one run with random numbers; `TimeUp` ends it
@@ -261,11 +203,6 @@ def search_with_cma(trace: Trace, box: BlackBox, random: np.random.Generator) ->
             if contest.on_area:
                 charged = partial(contest.penalised_area, own)
                 run(own, best, 0.01, members, lambda rows, charged=charged: np.array([charged(x) for x in rows]))
-
-
-def search_with_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run the thesis's simplex from the best of some random linkages."""
-    descend(box, random, trace.watch(box, box.penalised_quality))
 
 
 # pylinkage
@@ -353,8 +290,6 @@ class PylinkageScore:
             steps = own * -(-N // own)
             self.least_error = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
         self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
-        # the straight part is judged on pylinkage's curve, not by the box
-        self.plain = contest.plain[box.branch]
 
     def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
         """Return the penalised quality of the four-bar with these values."""
@@ -366,9 +301,7 @@ class PylinkageScore:
         if not np.isfinite(track).all():
             return inf
         at = track[self.least_error] if self.normal.timed else track
-        quality, excess = self.errors_and_excess(at, linkage.q[10])
-        excess += float(np.maximum(self.plain.violations(x[None, :]), 0.0).sum())
-        return quality + PENALTY * float(self.normal.weights.sum()) * excess
+        return self.errors(at, linkage.q[10]) + float(self.normal.weights.sum()) * self.contest.penalty(self.box, x)
 
     def penalised_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
         """Return `Contest.penalised_area` on the curve of pylinkage's solver."""
@@ -379,8 +312,8 @@ class PylinkageScore:
         curve = linkage.track()[:, 4]
         return self.contest.area(curve) + self.contest.penalty(self.box, x) if np.isfinite(curve).all() else inf
 
-    def errors_and_excess(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
-        """Return the weighted sum of squared errors, and the violation of the straight part's requirements.
+    def errors(self, track: ComplexArray, mounting: float) -> float:
+        """Return the weighted sum of squared errors.
 
         ``track`` has the joints at the stations, or over the whole turn if the path is untimed. ``mounting`` is the angle (rad)
         at which the output of a rocker function is mounted on the rocker.
@@ -388,34 +321,20 @@ class PylinkageScore:
         normal = self.normal
         if normal.angle is not None:
             left = np.angle((track[:, 3] - track[:, 1]) * np.exp(1j * (mounting - normal.angle)))
-            return float(normal.weights @ left**2), 0.0
+            return float(normal.weights @ left**2)
         assert normal.points is not None
         if normal.timed:
-            return float(normal.weights @ np.abs(track[:, 4] - normal.points) ** 2), 0.0
-        return min(self._errors_at_equal_shares(track[:, 4], way) for way in (1, -1))
+            return float(normal.weights @ np.abs(track[:, 4] - normal.points) ** 2)
+        curve = np.append(track[:, 4], track[0, 4])
+        # in both directions of travel
+        return min(self._errors_at_equal_shares(closed, normal.points) for closed in (curve, curve[::-1]))
 
-    def _errors_at_equal_shares(self, curve: ComplexArray, way: int) -> tuple[float, float]:
-        """Return errors and violation as `errors_and_excess` does, at equal shares of the lengths of curve and target.
-
-        ``way`` is the direction of travel on the curve, 1 or -1.
-        """
-        normal = self.normal
-        points = normal.points
-        assert points is not None
+    def _errors_at_equal_shares(self, curve: ComplexArray, points: ComplexArray) -> float:
+        """Return the errors of a closed curve at equal shares of the lengths of curve and target."""
         shares = np.cumsum(np.abs(np.diff(np.append(points, points[0]))))
-        curve = np.append(curve, curve[0])[::way]
         length = np.append(0.0, np.cumsum(np.abs(np.diff(curve))))
         at = np.append(0.0, shares[:-1]) / shares[-1] * length[-1]
-        met = np.interp(at, length, curve)
-        excess = 0.0
-        straight = normal.straight
-        if straight is not None:
-            spent = np.diff(np.interp(at[[straight.start, straight.end]], length, np.linspace(0.0, tau, len(curve))))
-            excess += max(0.0, float(spent[0]) - straight.rotation)
-            line = points[straight.end] - points[straight.start]
-            off = (met[straight.start : straight.end + 1] * line.conjugate()).imag / abs(line)
-            excess += max(0.0, float(np.ptp(off)) - (straight.flatness or inf))
-        return float(normal.weights @ np.abs(met - points) ** 2), excess
+        return float(self.normal.weights @ np.abs(np.interp(at, length, curve) - points) ** 2)
 
 
 def _search_with_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
@@ -441,14 +360,6 @@ def search_with_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) 
     _search_with_pylinkage(trace, box, (particle_swarm_optimization, {"bounds": bounds}), (minimize_linkage, {}))
 
 
-def search_with_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run pylinkage's differential evolution and, from its best linkage, its Nelder-Mead, with default settings."""
-    from pylinkage.optimization import differential_evolution_optimization, minimize_linkage
-
-    settings = {"bounds": (box.low, box.high), "seed": int(random.integers(1 << 31))}
-    _search_with_pylinkage(trace, box, (differential_evolution_optimization, settings), (minimize_linkage, {}))
-
-
 def search_with_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run pylinkage's Nelder-Mead from the best of as many random linkages as our simplex takes, with default settings."""
     from pylinkage.optimization import minimize_linkage
@@ -459,42 +370,12 @@ def search_with_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random
     _search_with_pylinkage(trace, box, (minimize_linkage, {"x0": first}))
 
 
-def search_with_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run pylinkage's function generation once for each phase; it solves Freudenstein's equation by least squares."""
-    from pylinkage.synthesis import function_generation
-
-    task = trace.contest.problem.task
-    assert isinstance(task, RockerFunction)
-    angle, rotation = np.asarray(task.angle), np.asarray(task.rotation)
-    low, high = trace.contest.limits.low, trace.contest.limits.high
-    free = np.nonzero(high > low)[0]
-    for phase in np.linspace(-pi, pi, PHASES, endpoint=False).tolist():
-        pairs = list(zip((rotation + phase).tolist(), angle.tolist()))
-        for found in function_generation(pairs, ground_length=float(low[2])).raw_solutions:
-            q = 0.5 * (low + high)
-            q[3:6] = found.crank_length, found.coupler_length, found.rocker_length
-            q[8] = phase
-            for other in trace.contest.boxes:
-                trace.record_if_best(other, q[free])
-    raise TimeUp
-
-
 BlackBoxSearch = Callable[[Trace, BlackBox, np.random.Generator], None]
 
-SEARCHES: dict[str, BlackBoxSearch] = {
-    "SciPy's differential evolution": search_with_scipy,
-    "simplex, many starts (the thesis)": search_with_simplex,
-    "pylinkage, particle swarm": search_with_swarm,
-    "pylinkage, differential evolution": search_with_pylinkage_evolution,
-    "pylinkage, Nelder-Mead, many starts": search_with_pylinkage_simplex,
-}
 
-
-def run_search(
-    search: BlackBoxSearch, contest: Contest, budget: float, enough: float, clock: Callable[[], float] = perf_counter
-) -> Trace:
-    """Repeat a search, alternating the assemblies, until its time is over or its goal is reached; return its trace."""
-    trace = Trace(contest, budget, enough, clock)
+def run_search(search: BlackBoxSearch, contest: Contest, budget: float) -> Trace:
+    """Repeat a search, alternating the assemblies, until its time is over; return its trace."""
+    trace = Trace(contest, budget)
     with suppress(TimeUp):
         for number in count():
             search(trace, contest.boxes[number % len(contest.boxes)], np.random.default_rng([0, number]))

@@ -25,7 +25,6 @@ from contextlib import suppress
 from itertools import count
 from math import inf, isfinite
 from pathlib import Path
-from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,17 +82,17 @@ class Row(NamedTuple):
 
 def search_with_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Call `synthesize` with growing effort; measure its answers in the same way as those of the other searches."""
-    contest = trace.contest
-    problem, limits = contest.problem, contest.limits
+    target, limits, normal = trace.contest.target, trace.contest.limits, trace.contest.normal
+    boxes = {box.branch: box for box in trace.contest.boxes}
     for k in count():
         more = 1 << min(k, DOUBLED)
         search = Search(candidates=more * FIRST.candidates, starts=more * FIRST.starts, seed=k)
         with suppress(InfeasibleError):
-            answer = synthesize(problem.task, problem.bounds, problem.constraints, kinds=("four-bar",), search=search)
+            answer = synthesize(target.task, target.bounds, target.constraints, kinds=("four-bar",), search=search)
             linkage = answer.best.linkage
-            q = make_start(linkage, contest.normal).q
+            q = make_start(linkage, normal).q
             if ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all():
-                trace.record_if_best(contest.plain[linkage.branch], q[limits.high > limits.low])
+                trace.record_if_best(boxes[linkage.branch], q[limits.high > limits.low])
         trace.tick()
 
 
@@ -108,10 +107,10 @@ RACERS: Mapping[str, BlackBoxSearch] = {
 
 def run(target: Target, search: str, budget: float) -> Row:
     """Run one search on a target."""
-    contest = Contest.from_problem(target, on_area=True)
+    contest = Contest.from_target(target)
     normal = contest.normal
     with threadpool_limits(1):
-        trace = run_search(RACERS[search], contest, budget, -inf, process_time)
+        trace = run_search(RACERS[search], contest, budget)
     exact = (EXACT * normal.unit) ** 2 * (1.0 if contest.on_area else float(normal.weights.sum()))
     errors = tuple(trace.least_error(seconds) if seconds <= budget else np.nan for seconds in TIMES)
     return Row(target.kind, target.name, search, exact, errors)

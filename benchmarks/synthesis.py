@@ -1,4 +1,4 @@
-"""Compare the synthesis with pylinkage's optimisers, SciPy's differential evolution and the thesis's simplex.
+"""Measure the synthesis: its kernels, its time on the problems of Youssef's chapter VI, and the starts that it needs.
 
     python -m benchmarks.synthesis
 
@@ -6,17 +6,10 @@ Three tables, all in one run:
 
 1. the time of a coupler curve of 72 points and of its Jacobian in a compiled loop, compared with NumPy over arrays and with
    pylinkage's steps;
-2. for every problem of chapter VI, the time until the goal is reached, and until the error is within 1 % of the best that any
-   search of the run found. `synthesize` is timed as a whole call, with its default settings and with `FEW` candidates and
-   starts. Each other search is restarted, alternating the assemblies, until its time (``--budget``, s) is over or it has
-   reached our error. All searches have the same unknowns, bounds and constraints, and all are measured alike: when a search
-   improves, its clock is stopped, and the linkage is evaluated by the task's own measure, unless it violates a constraint;
+2. for every problem of chapter VI, the error and the time of a call of `synthesize`, with its default settings, on two cores,
+   and with `FEW` candidates and starts (`benchmarks.race` compares it with other searches);
 3. how many of 40 starts reach the optimum, with bounds alone, and the time of a start: with exact Jacobians (SciPy's least
    squares, IPOPT) and with the simplex.
-
-`benchmarks.contest` tells how pylinkage is applied to these problems. Its closed-form synthesis of paths takes only five points
-and is not used. Its synthesis of functions needs the phase and knows no weights. It is therefore tried for `PHASES` phases, on
-the unweighted function alone.
 """
 
 from __future__ import annotations
@@ -25,7 +18,7 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf, isfinite, pi, tau
+from math import pi, tau
 from statistics import median
 from time import perf_counter
 from types import SimpleNamespace
@@ -39,7 +32,7 @@ from rich.table import Table
 
 from analysis.numerics.tracing import rebind_functions
 from analysis.studies.youssef.problems import PROBLEMS, WEIGHT, N, ellipse
-from analysis.synthesis import LargestLink, Linkage, RockerFunction, Search, TimedPath, normal_form, synthesize, turn
+from analysis.synthesis import LargestLink, Linkage, Search, TimedPath, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path, coupler_path_jacobian
 from analysis.synthesis.search.polish import Polisher, fit_least_squares, sum_of_squares
 from analysis.synthesis.search.scan import scan
@@ -49,22 +42,19 @@ from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
 from .black_box import DRAWS, BlackBox, minimise_score
-from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, run_search, search_with_freudenstein
+from .contest import PlacedFourBar
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-#: Time given to each search except ours on each problem (s).
-BUDGET = 15.0
-#: A search ends when its error is within this fraction of ours: a further improvement is not worth the time.
-ENOUGH = 1e-4
 #: Fraction above the best error that counts as "within 1 % of the best".
 NEAR = 0.01
 #: Number of starts for the third table.
 STARTS = 40
 REPEATS = 15
-#: Settings of a shorter call of `synthesize`, which is timed besides the default one.
+#: Settings of a shorter call of `synthesize`, and the settings of the second table by heading.
 FEW = Search(candidates=1 << 12, starts=4)
+SETTINGS = {"defaults": Search(), "2 cores": Search(n_jobs=2), f"{FEW.starts} starts": FEW}
 
 
 # Kernels
@@ -120,11 +110,11 @@ def time_per_call(run: Callable[[int], object], calls: int) -> float:
     return median(times)
 
 
-def kernel_times(linkage: Linkage, n: int = N) -> dict[str, float]:
-    """Return the times (s) of a coupler curve of n points and of its Jacobian, by method, ours first."""
-    rotation = turn(n)
-    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
-    q, out, jacobian = linkage.vector, np.empty((2, n)), np.empty((12, 2, n))
+def kernel_times(linkage: Linkage) -> dict[str, float]:
+    """Return the times (s) of a coupler curve of N points and of its Jacobian, by method, ours first."""
+    rotation = turn(N)
+    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(N)
+    q, out, jacobian = linkage.vector, np.empty((2, N)), np.empty((12, 2, N))
     times = {
         "compiled, in a compiled loop": time_per_call(lambda k: _curves(k, c, s, zero, q, out), 20_000),
         "its Jacobian and the curve, in a compiled loop": time_per_call(
@@ -133,15 +123,15 @@ def kernel_times(linkage: Linkage, n: int = N) -> dict[str, float]:
         "NumPy over arrays": time_per_call(lambda k: [curve_by_numpy(linkage, rotation) for _ in range(k)], 200),
     }
     with suppress(ImportError):
-        times.update(_kernel_times_of_pylinkage(linkage, n))
+        times.update(_kernel_times_of_pylinkage(linkage))
     return times
 
 
-def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
+def _kernel_times_of_pylinkage(linkage: Linkage) -> dict[str, float]:
     from pylinkage.bridge.solver_conversion import linkage_to_solver_data
     from pylinkage.solver.simulation import simulate
 
-    four_bar = PlacedFourBar.from_linkage(linkage, n)
+    four_bar = PlacedFourBar.from_linkage(linkage, N)
     data = linkage_to_solver_data(four_bar.linkage)
     arrays = (data.constraints, data.joint_types, data.parent_indices, data.constraint_offsets, data.solve_order)
 
@@ -149,44 +139,16 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
     def loop(repeats, positions, constraints, types, parents, offsets, order):
         total = 0.0
         for _ in range(repeats):
-            total += simulate(positions, constraints, types, parents, offsets, order, n, 1.0)[0, 4, 0]
+            total += simulate(positions, constraints, types, parents, offsets, order, N, 1.0)[0, 4, 0]
         return total
 
     return {
         "pylinkage's compiled simulate, in a compiled loop": time_per_call(
             lambda k: loop(k, data.positions, *arrays), 2_000
         ),
-        "pylinkage's step_fast": time_per_call(lambda k: [four_bar.linkage.step_fast(n) for _ in range(k)], 200),
-        "pylinkage's step": time_per_call(lambda k: [list(four_bar.linkage.step(n)) for _ in range(k)], 5),
+        "pylinkage's step_fast": time_per_call(lambda k: [four_bar.linkage.step_fast(N) for _ in range(k)], 200),
+        "pylinkage's step": time_per_call(lambda k: [list(four_bar.linkage.step(N)) for _ in range(k)], 5),
     }
-
-
-def run_synthesize(contest: Contest, search: Search) -> Trace:
-    """Run `synthesize` on a problem; its answer is recorded at the end of the call."""
-    problem = contest.problem
-    trace = Trace(contest, inf)
-    begun = perf_counter()
-    result = synthesize(problem.task, problem.bounds, problem.constraints, search=search)
-    trace.points.append((perf_counter() - begun, problem.convert(result.best.error)))
-    return trace
-
-
-def run_contest(contest: Contest, budget: float) -> dict[str, Trace]:
-    """Run every search on a problem, ours first; searches of pylinkage are left out if it is not installed."""
-    traces = {
-        "synthesize": run_synthesize(contest, Search()),
-        "synthesize, 2 cores": run_synthesize(contest, Search(n_jobs=2)),
-        f"synthesize, {FEW.starts} starts": run_synthesize(contest, FEW),
-    }
-    enough = (1.0 + ENOUGH) * min(trace.best for trace in traces.values())
-    searches = dict(SEARCHES)
-    task = contest.problem.task
-    if isinstance(task, RockerFunction) and np.ptp(np.asarray(task.weights)) == 0.0:
-        searches[f"pylinkage, function generation, {PHASES} phases"] = search_with_freudenstein
-    for name, search in searches.items():
-        with suppress(ImportError):
-            traces[name] = run_search(search, contest, budget, enough)
-    return traces
 
 
 # Starts
@@ -266,35 +228,29 @@ def kernel_table() -> Table:
     return table
 
 
-def contest_table(names: Sequence[str], budget: float, console: Console) -> Table:
-    """Measure and return the second table, of the searches on the problems of chapter VI."""
-    table = Table(title=f"problems of chapter VI; {budget:g} s for each other search; one core unless two are named")
-    for heading in ("problem", "search", "error", "s to the goal", "s to 1 % of the best", "times synthesize"):
-        table.add_column(heading, justify="left" if heading in ("problem", "search") else "right")
+def problem_table(names: Sequence[str]) -> Table:
+    """Measure and return the second table, of the problems of chapter VI."""
+    # machine code, CasADi and the workers are loaded before the timing begins
+    for search in SETTINGS.values():
+        _run_problem("ellipse-a", search)
+    table = Table(title="problems of chapter VI: error in the thesis's unit, and seconds")
+    for heading in ("problem", *SETTINGS):
+        table.add_column(heading)
     for name in names:
         problem = PROBLEMS[name]
-        traces = run_contest(Contest.from_problem(problem), budget)
-        best = min(trace.best for trace in traces.values())
-        first = next(iter(traces.values())).reaching_time((1.0 + NEAR) * best)
-        title = f"{name}: goal {problem.goal:g} {problem.unit}"
-        for search, trace in traces.items():
-            near = trace.reaching_time((1.0 + NEAR) * best)
-            table.add_row(
-                title,
-                search,
-                f"{trace.best:.4g}" if isfinite(trace.best) else "none feasible",
-                _seconds(trace.reaching_time(problem.goal)),
-                _seconds(near),
-                f"{near / first:.2f}" if isfinite(near / first) else "",
-            )
-            title = ""
-        table.add_section()
-        console.print(f"{name} done", highlight=False)
+        table.add_row(
+            f"{name}: goal {problem.goal:g} {problem.unit}",
+            *(_run_problem(name, search) for search in SETTINGS.values()),
+        )
     return table
 
 
-def _seconds(value: float) -> str:
-    return f"{value:.2f}" if isfinite(value) else "not reached"
+def _run_problem(name: str, search: Search) -> str:
+    """Return the error of `synthesize` on a problem and the time of the call, as text."""
+    problem = PROBLEMS[name]
+    begun = perf_counter()
+    best = synthesize(problem.task, problem.bounds, problem.constraints, search=search).best
+    return f"{problem.convert(best.error):.4g} in {perf_counter() - begun:.2f}"
 
 
 def start_table() -> Table:
@@ -320,15 +276,12 @@ def start_table() -> Table:
     return table
 
 
-def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None:
+def main(names: Sequence[str]) -> None:
     """Measure and print the three tables."""
     console = Console(width=150)
     begun = perf_counter()
     console.print(kernel_table())
-    # machine code, CasADi and the workers are loaded before the timing begins
-    for cores in (1, 2):
-        run_synthesize(Contest.from_problem(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
-    console.print(contest_table(names, budget, console))
+    console.print(problem_table(names))
     console.print(start_table())
     try:
         import pylinkage
@@ -341,9 +294,7 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--budget", type=float, default=BUDGET, help="time of each other search on each problem (s)")
     parser.add_argument(
         "--problem", choices=tuple(PROBLEMS), action="append", help="run only this problem (repeatable)"
     )
-    arguments = parser.parse_args()
-    main(arguments.budget, arguments.problem or tuple(PROBLEMS))
+    main(parser.parse_args().problem or tuple(PROBLEMS))

@@ -53,17 +53,13 @@ POLYGONS: Mapping[str, Points] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Target:
-    """A synthesis task with its bounds and constraints; errors are in SI units."""
+    """A synthesis task with its bounds and constraints."""
 
     kind: str
     name: str
     task: Task
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     constraints: tuple[Constraint, ...] = USUAL
-
-    def convert(self, error: float) -> float:
-        """Return the error unchanged: the reported unit is SI."""
-        return error
 
 
 def curves(n: int) -> dict[str, FloatArray]:
@@ -109,16 +105,15 @@ def random_waves(seed: int) -> RockerFunction:
     return RockerFunction(angle=radians(40.0) * angle / np.ptp(angle), mounting=True)
 
 
-def function_target(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
+def function_target(function: Any, low: float, high: float) -> RockerFunction:
     """Return the task of generating y = f(x), with x as the crank angle over 90 degrees and y as the rocker angle.
 
-    Both scales are linear, both zeros free; y varies over ``output_deg`` degrees of the rocker.
+    Both scales are linear, both zeros free; y varies over 60 degrees of the rocker.
     """
     x = np.linspace(low, high, 31)
     y = function(x)
-    return RockerFunction(
-        angle=radians(output_deg) * (y - y[0]) / np.ptp(y), rotation=np.linspace(0.0, 0.5 * pi, 31), mounting=True
-    )
+    rotation = np.linspace(0.0, 0.5 * pi, 31)
+    return RockerFunction(angle=radians(60.0) * (y - y[0]) / np.ptp(y), rotation=rotation, mounting=True)
 
 
 def rise_and_dwell() -> RockerFunction:

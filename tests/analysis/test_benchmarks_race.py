@@ -1,19 +1,24 @@
-"""The race of `benchmarks.race`: its targets, what the searches are scored by, its results, and how they are counted."""
+"""The race of `benchmarks.race`: its targets, curves and scores, its results, and how they are counted."""
 
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 from math import inf, nan, radians
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
-from analysis.synthesis import Linkage
+from analysis.studies.youssef.problems import PROBLEMS
+from analysis.synthesis import Linkage, turn
+from analysis.synthesis.search.start import make_start
+from benchmarks import contest as shared
 from benchmarks import race
-from benchmarks.contest import Contest, PylinkageScore, run_search
+from benchmarks.contest import Contest, PlacedFourBar, PylinkageScore, TimeUp, Trace, run_search
 from benchmarks.race import OURS, RACERS, TIMES, Row
+from benchmarks.synthesis import curve_by_numpy
 from benchmarks.targets import TARGETS, Target
 
 pytest.importorskip("pylinkage")
@@ -52,7 +57,7 @@ def test_the_same_targets_every_time() -> None:
     [("timed", "line in a third of a turn"), ("timed", "18 points"), ("function", "sine"), ("function", "waves 1")],
 )
 def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: str) -> None:
-    contest = Contest.from_problem(target(kind, name))
+    contest = Contest.from_target(target(kind, name))
     random = np.random.default_rng(1)
     compared = 0
     for box in contest.boxes:
@@ -68,7 +73,7 @@ def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: st
 
 @pytest.mark.slow
 def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
-    contest = Contest.from_problem(target("polygonal", "L"), on_area=True)
+    contest = Contest.from_target(target("polygonal", "L"))
     assert contest.on_area
     random = np.random.default_rng(1)
     measured = charged = 0
@@ -89,13 +94,62 @@ def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
     assert charged > 10
 
 
-def test_linkwork_races_as_the_others_do() -> None:
-    contest = Contest.from_problem(target("function", "sine"))
-    # a search of any kind ends as soon as it has enough; least squares leave 0.0059 rad2
-    trace = run_search(race.search_with_linkwork, contest, 60.0, 0.006, process_time)
-    assert 0.0058 < trace.best <= 0.006
-    assert trace.least_error(inf) == trace.best
-    assert trace.least_error(0.0) == inf
+@pytest.mark.parametrize("linkage", [pytest.param(problem.linkage, id=name) for name, problem in PROBLEMS.items()])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_pylinkage_and_numpy_trace_our_curve(linkage: Linkage, branch: int) -> None:
+    moved = Linkage.from_vector(linkage.vector, branch).translate(0.3, -0.2)
+    ours = moved.path(turn(72)) @ [1.0, 1j]
+    size = moved.largest_link
+    np.testing.assert_allclose(PlacedFourBar.from_linkage(moved, 72).track()[:, 4], ours, rtol=0.0, atol=1e-9 * size)
+    np.testing.assert_allclose(curve_by_numpy(moved, turn(72)), ours, rtol=0.0, atol=1e-12 * size)
+
+
+def test_a_linkage_that_is_not_feasible_does_not_count() -> None:
+    contest = Contest.from_target(target("timed", "ellipse-a"))
+    # the printed linkage has a transmission angle below 40 degrees
+    linkage = PROBLEMS["ellipse-a"].linkage
+    box = next(b for b in contest.boxes if b.branch == linkage.branch)
+    x = make_start(linkage, contest.normal).q[contest.limits.high > contest.limits.low]
+    trace = Trace(contest, 10.0)
+    trace.record_if_best(box, x)
+    assert trace.points == []
+    assert trace.best == inf
+    # links that cannot be joined, or beyond the bounds
+    score = PylinkageScore(contest, box)
+    x[2], x[4], x[5] = box.high[2], 0.1 * box.high[4], 0.1 * box.high[5]
+    assert score(score.four_bar, x.tolist()) == score(score.four_bar, (box.high + 1.0).tolist()) == inf
+
+
+def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> None:
+    contest = Contest.from_target(target("function", "rocker"))
+    box, now, values = contest.boxes[0], [0.0], iter([5.0, 7.0, 3.0])
+
+    def slow(*_: object) -> float:
+        now[0] += 6.0
+        return next(values)
+
+    monkeypatch.setattr(shared, "process_time", lambda: now[0])
+    monkeypatch.setattr(Contest, "error", slow)
+    trace = Trace(contest, 10.0)
+    for _ in range(3):
+        now[0] += 1.0
+        trace.record_if_best(box, box.low)
+    assert trace.points == [(1.0, 5.0), (3.0, 3.0)]
+    assert (trace.least_error(2.0), trace.least_error(0.5)) == (5.0, inf)
+    now[0] += 8.0
+    with pytest.raises(TimeUp):
+        trace.tick()
+
+
+def test_what_improves_is_offered() -> None:
+    contest = Contest.from_target(target("function", "rocker"))
+    box, trace = contest.boxes[0], Trace(contest, 10.0)
+    offered: list[float] = []
+    trace.record_if_best = lambda box, x: offered.append(float(x[0]))
+    minimize(trace.watch(box, lambda x: float(x[0] ** 2)), [3.0], method="Nelder-Mead")
+    assert offered[0] == 3.0
+    assert all(abs(b) < abs(a) for a, b in pairwise(offered))
+    assert abs(offered[-1]) < 1e-3
 
 
 def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,8 +213,7 @@ def test_the_tables_count() -> None:
     assert race.picture(both).axes
 
 
-@pytest.mark.parametrize("search", ["CMA-ES", "pylinkage Nelder-Mead"])
+@pytest.mark.parametrize("search", [OURS, "SciPy DE", "CMA-ES", "pylinkage Nelder-Mead"])
 def test_the_searches_end_on_the_area(search: str) -> None:
     # of 1 m2 inside; at equal shares of the length the best is a circle with 0.182
-    contest = Contest.from_problem(target("polygonal", "square"), on_area=True)
-    assert run_search(RACERS[search], contest, 60.0, 0.9, process_time).best <= 0.9
+    assert run_search(RACERS[search], Contest.from_target(target("polygonal", "square")), 2.0).best <= 0.9
