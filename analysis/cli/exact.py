@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import click
 
+from linkwork.errors import InputError
+
 from . import common
 from .codes import ENDED_EARLY
 from .design import print_best, print_solutions, read_overrides, write_description_files, write_linkages
@@ -45,6 +47,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         function_generators,
         guidance,
         load_synthesis_case,
+        quality_cells,
         solution_columns,
     )
 
@@ -53,6 +56,8 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     found: Generators | Guidance | GuidanceMap
     if isinstance(chosen.task, RockerFunction):
         found = function_generators(chosen.task, crank_phase=crank_phase)
+    elif crank_phase is not None:
+        raise InputError("--crank-phase is for a function of the rocker: poses leave the crank's angle free")
     else:
         found = guidance(chosen.task, count)
     common.console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
@@ -60,6 +65,11 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     written = []
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)
+        if any(quality_cells(s)[-1] != "0" for s in found.solutions):
+            common.print_error(
+                "note: each linkage meets all targets, but one with a branch or circuit defect needs both assemblies for them; "
+                "its errors are those in the assembly of the first target"
+            )
         best = found.solutions[0]
         written.append(write_csv(folder / "solutions.csv", solution_columns(found.solutions)))
         if best.verdicts.sound:

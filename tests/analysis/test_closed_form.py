@@ -481,6 +481,7 @@ def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) 
     result = linkwork(EXAMPLES / "five-poses.toml", "--no-plots")
     assert result.exit_code == 0
     assert "6 four-bars, driven from either side: 7 of 12 sound" in result.output
+    assert "its errors are those in the assembly of the first" in result.output
     assert {p.name for p in (tmp_path / "out").iterdir()} - {".linkwork"} == {
         "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "linkage.toml",
         *(f"linkage-{rank}.toml" for rank in range(2, 8)),
@@ -509,11 +510,15 @@ def test_command_of_a_function(linkwork: Callable[..., Result]) -> None:
     result = linkwork(EXAMPLES / "sine-function.toml", "--no-plots")
     assert result.exit_code == 0
     assert "1 four-bar through the 5 points: 1 sound" in result.output
+    assert "its errors" not in result.output
     result = linkwork(EXAMPLES / "sine-function.toml", "--set", "task.n=4", "--crank-phase", "100 deg", "--no-plots")
     assert "through the 4 points" in result.output
     result = linkwork(EXAMPLES / "sine-function.toml", "--set", "task.n=6")
     assert result.exit_code == cli.WRONG
     assert "Leave points out" in result.output
+    result = linkwork(EXAMPLES / "five-poses.toml", "--crank-phase", "10 deg")
+    assert result.exit_code == cli.WRONG
+    assert "poses leave the crank's angle free" in result.output
 
 
 def test_pictures_show_every_dyad_and_linkage() -> None:
