@@ -230,6 +230,12 @@ def test_what_is_not_usable_is_refused(made: Any, message: str) -> None:
     [
         (SWING, syn.Toggle(at=1.0), syn.InfeasibleError, "cannot turn fully"),
         (
+            syn.SliderFunction(position=[0.0, 1.0, 0.5]),
+            syn.MechanicalAdvantage(greatest=9.0),
+            syn.InfeasibleError,
+            "rests twice",
+        ),
+        (
             syn.UntimedPath(path=syn.TargetPath(points=[[0, 0], [1, 0], [1, 1]], closed=True)),
             syn.DeadCentre(at=1.0),
             InputError,

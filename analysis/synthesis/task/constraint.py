@@ -262,6 +262,11 @@ class Demand:
     #: Whether the constraint is an objective that replaces the error.
     seeks: ClassVar[bool] = False
 
+    @property
+    def excludes_rest(self) -> bool:
+        """Return whether the constraint excludes dead centres, in which rocker or slider rest."""
+        return False
+
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the functions of the dimensions that must be at most zero, or equal to zero."""
         raise NotImplementedError
@@ -352,10 +357,10 @@ class Stroke:
         found = []
         if self.least > 0.0:
             low = self.least
-            found.append(Require(function=lambda d: low - stroke(d), name="least stroke", scale=low))
+            found.append(Require(function=lambda d: low - stroke(d), name="least stroke", scale=low, unit="m"))
         if isfinite(self.greatest):
             high = self.greatest
-            found.append(Require(function=lambda d: stroke(d) - high, name="greatest stroke", scale=high))
+            found.append(Require(function=lambda d: stroke(d) - high, name="greatest stroke", scale=high, unit="m"))
         return tuple(found)
 
 

@@ -261,6 +261,11 @@ class MechanicalAdvantage(Demand):
                 raise ParameterError("rotations of the mechanical advantage", self.at, "be finite numbers (rad)")
             object.__setattr__(self, "at", at)
 
+    @property
+    def excludes_rest(self) -> bool:
+        """Return whether the greatest advantage is bounded everywhere: it is infinite in a dead centre."""
+        return self.at is None and isfinite(self.greatest)
+
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the functions of dimensions and crank rotation that must be at most zero."""
         all_the_way = self.at is None

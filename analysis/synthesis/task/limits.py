@@ -166,6 +166,12 @@ def make_limits(
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
     over = RotationRange(turn is not None, normal.rotation, straight, linkage)
+    rests = linkage is SliderCrank or grashof == "crank-rocker"
+    if over.turn and rests and any(isinstance(c, Demand) and c.excludes_rest for c in constraints):
+        raise InfeasibleError(
+            f"the {linkage.driven[0]} of a crank that turns fully rests twice in a turn, where the mechanical advantage is "
+            "infinite: bound the greatest one at crank rotations"
+        )
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.least_function(over, normal))]
     if len(least) > 1:
         raise InputError("more than one constraint is to be minimised: a search has one objective")
@@ -448,9 +454,14 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
                 equal=True,
                 name="place of the guide",
                 scale=normal.unit,
+                unit="m",
             ),
             Require(
-                function=lambda d: d.point_distance - d.coupler_length, equal=True, name="slider", scale=normal.unit
+                function=lambda d: d.point_distance - d.coupler_length,
+                equal=True,
+                name="slider",
+                scale=normal.unit,
+                unit="m",
             ),
         )
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds)
