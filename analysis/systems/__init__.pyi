@@ -17,8 +17,8 @@ from .many import run_many as run_many
 from .master import COUPLINGS as COUPLINGS
 from .master import SystemRun as SystemRun
 from .master import run_system as run_system
-from .ssp import read_ssp as read_ssp
 from .ssp import write_ssp as write_ssp
+from .ssp_reader import read_ssp as read_ssp
 from .wiring import Bond as Bond
 from .wiring import End as End
 from .wiring import Wiring as Wiring

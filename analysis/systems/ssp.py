@@ -1,28 +1,21 @@
-"""Write and read systems as SSP archives (System Structure and Parameterization), with pyssp-standard.
+"""Write systems as SSP archives (System Structure and Parameterization), with pyssp-standard.
 
 An archive follows SSP 1.0, which supports FMI 2.0; with an FMI 3.0 part it follows SSP 2.0. This module adds the geometry of
-the diagram, which the library does not write, and moves the units to where the schema requires them. The library ignores
-transformations of connections and signal dictionaries: a file that has one is refused.
+the diagram, which the library does not write, and moves the units to where the schema requires them.
 """
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import tempfile
-import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
-
-from linkwork.errors import InputError
 
 from ..files import output
 from ..libraries import lazy
-from ..numerics.cache import code_folder, store_file
 from .layout import boxes
-from .wiring import BASE, REAL, End, Part, Port, Wiring, WiringError, exponents
+from .wiring import BASE, REAL, Part, Wiring
 
 ssp = lazy("pyssp_standard.ssp")
 ssd = lazy("pyssp_standard.ssd")
@@ -31,9 +24,7 @@ unit = lazy("pyssp_standard.unit")
 etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 #: Type of the experiment's annotation with the communication step, for which the standard has no place.
-_STEP = "linkwork.communication-step"
-#: Elements that the library ignores silently.
-_UNREAD = ("LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "SignalDictionaries")
+STEP = "linkwork.communication-step"
 
 
 def write_ssp(wiring: Wiring, path: str | Path) -> Path:
@@ -121,7 +112,7 @@ def _complete_structure(path: Path, wiring: Wiring) -> None:
         found[f"{_NAMESPACE}DefaultExperiment"].addprevious(found[f"{_NAMESPACE}Units"])
     common = f"{{{root.nsmap['ssc']}}}"
     annotations = etree.SubElement(found[f"{_NAMESPACE}DefaultExperiment"], f"{_NAMESPACE}Annotations")
-    note = etree.SubElement(annotations, f"{common}Annotation", type=_STEP)
+    note = etree.SubElement(annotations, f"{common}Annotation", type=STEP)
     etree.SubElement(note, "step", unit="s").text = repr(wiring.step)
     for element in root.iter(f"{_NAMESPACE}Component"):
         box = placed[element.get("name")]
@@ -168,133 +159,3 @@ def _values(path: Path, part: Part) -> Path:
         del node.attrib["unit"]
     tree.write(path, xml_declaration=True, encoding="utf-8")
     return path
-
-
-def read_ssp(path: str | Path) -> Wiring:
-    """Read a system from an ``.ssp``: FMUs on one level, connections, start values from ``.ssv`` with names mapped by ``.ssm``.
-
-    Raises
-    ------
-    InputError
-        If the file is no ``.ssp``.
-    MissingLibraryError
-        If pyssp-standard is not installed.
-    WiringError, UnknownNameError
-        If the system has an element that is not supported, or a connection is wrong.
-    """
-    if not zipfile.is_zipfile(path):
-        raise InputError(f"{path} is no .ssp: it must be an archive with a SystemStructure.ssd")
-    with zipfile.ZipFile(path) as archive:
-        if "SystemStructure.ssd" not in archive.namelist():
-            raise InputError(f"{path} has no SystemStructure.ssd: it must be an archive of SSP")
-        nodes = list(ElementTree.fromstring(archive.read("SystemStructure.ssd")).iter())
-    tags = {node.tag.rpartition("}")[2] for node in nodes}
-    for tag in _UNREAD:
-        if tag in tags:
-            raise WiringError(f"{path} has a {tag}, which is not supported: a part of the system must do what it does")
-    for node in nodes:
-        if node.tag.endswith("}DefaultExperiment") and {"startTime", "stopTime"} - {*node.keys()}:
-            raise WiringError(f"{path} has a DefaultExperiment without startTime or stopTime: give both")
-    folder = code_folder("systems") / hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
-    folder.mkdir(parents=True, exist_ok=True)
-    with ssp.SSP(path, mode="r") as archive, archive.system_structure as structure:
-        system, parts = structure.system, {}
-        for element in system.elements:
-            if not getattr(element, "source", None):
-                raise WiringError(
-                    f"{getattr(element, 'name', 'an element')} is no FMU: a system inside a system is not read"
-                )
-            fmu = folder / Path(element.source).name
-            store_file(fmu, (archive.unpacked_path / element.source).read_bytes())
-            bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
-            texts = _start_values(
-                archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ())
-            )
-            part = Part.from_fmu(element.name, fmu, {})
-            values = {
-                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, unit, base)
-                for key, (text, unit, base) in texts.items()
-            }
-            parts[element.name] = Part.from_fmu(element.name, fmu, values)
-        connections = {
-            End(c.end_element, c.end_connector): End(c.start_element, c.start_connector)
-            for c in system.connections
-            if c.start_element and c.end_element
-        }
-        twice = [c for c in system.connections if c.end_element]
-        if len(connections) < len(twice):
-            raise WiringError(
-                f"{path}: an input has two connections, or a connection begins at the system's edge: each input must have one, "
-                "from a part"
-            )
-        experiment = structure.default_experiment
-    if experiment is not None and experiment.start_time:
-        raise WiringError(f"{path} starts at {experiment.start_time} s: it must start at 0 s")
-    stop_time = experiment.stop_time if experiment is not None else 1.0
-    steps = [str(node[0].text) for node in nodes if node.get("type") == _STEP and len(node)]
-    step = _as_number(steps[0], None, f"{path}: the communication step") if steps else 1e-3 * stop_time
-    return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
-
-
-def _start_values(
-    folder: Path, bindings: Iterable[Any], name: str, own: int
-) -> dict[str, tuple[str, str, tuple[float, ...] | None]]:
-    """Return the start values of the part ``name`` as texts, with unit and its definition in base units, by variable.
-
-    The first ``own`` bindings belong to the part. The other bindings belong to the system; there the names of the part's
-    variables begin with the name of the part. If a variable has several values, the first one is taken.
-    """
-    found: dict[str, tuple[str, str, tuple[float, ...] | None]] = {}
-    for number, binding in enumerate(bindings):
-        inline, prefix = binding.ssv is not None, binding.prefix or ""
-        values = binding.ssv if inline else lazy("pyssp_standard.ssv").SSV(folder / binding.source, mode="r")
-        mapped = _mapping(folder, binding)
-        for parameter in values.parameters:
-            for target in mapped.get(parameter["name"], (parameter["name"],) if not mapped else ()):
-                whole = f"{prefix}{target}"
-                if number >= own and not whole.startswith(f"{name}."):
-                    continue
-                given = parameter["type_value"].parameter
-                unit = given.get("unit") or ""
-                defined = values.units.units.get(unit) if values.units is not None else None
-                base = None if defined is None or defined.base_unit is None else exponents(defined.base_unit)
-                key = whole if number < own else whole.removeprefix(f"{name}.")
-                found.setdefault(key, (given["value"], unit, base))
-    return found
-
-
-def _convert(value: float, part: Part, key: str, unit: str, base: tuple[float, ...] | None) -> float:
-    """Return a start value in the unit of its variable; ``unit`` is the unit in which it is given, ``base`` its definition."""
-    port = part.ports.get(key)
-    own = None if port is None else part.base_unit(key)
-    if port is None or own is None or unit in ("", port.unit):
-        return value
-    if base is None or len(own) != len(base) or own[:-2] != base[:-2]:
-        raise WiringError(f"{part.name}.{key} starts with {value:g} {unit}: it must be in {port.unit or 'no unit'}")
-    return float((value * base[-2] + base[-1] - own[-1]) / own[-2])
-
-
-def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:
-    """Return the targets of each parameter in the ``.ssm`` of a binding; empty if the binding has no ``.ssm``."""
-    mapping = binding.parameter_mapping
-    if mapping is None:
-        return {}
-    ssm = lazy("pyssp_standard.ssm")
-    inline = mapping.ssm is not None
-    entries = (ssm.SSMElem.from_xml(mapping.ssm) if inline else ssm.SSM(folder / mapping.source, mode="r")).entries
-    found: dict[str, tuple[str, ...]] = {}
-    for entry in entries:
-        found[entry.source] = (*found.get(entry.source, ()), entry.target)
-    return found
-
-
-def _as_number(text: str, port: Port | None, name: str) -> float:
-    """Return a start value as a number: 0 or 1 for a Boolean, the value of the item for an enumeration."""
-    names = {item: float(value) for value, item in port.items} if port is not None else {}
-    names |= {"true": 1.0, "false": 0.0}
-    if text in names:
-        return names[text]
-    try:
-        return float(text)
-    except ValueError:
-        raise WiringError(f"{name} starts with {text!r}: it must be a number") from None

@@ -26,7 +26,7 @@ DIMENSIONLESS = tuple(float(k == "factor") for k in BASE)
 
 
 def exponents(unit: Any) -> tuple[float, ...]:
-    """Return the exponents of the base units, factor and offset of a definition, as FMPy or pyssp-standard reads it."""
+    """Return the exponents of the base units, factor and offset of a definition, as FMPy reads it."""
     return tuple(1.0 if k == "factor" and getattr(unit, k) is None else getattr(unit, k) or 0 for k in BASE)
 
 
@@ -183,6 +183,8 @@ class Wiring:
         The output that each input is connected to.
     stop_time, step : float
         End of a run, and default communication step (s).
+    remarks : tuple of str
+        What of the file from which the system was read has no effect.
 
     Raises
     ------
@@ -195,6 +197,7 @@ class Wiring:
     connections: Mapping[End, End]
     stop_time: float
     step: float
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for target, source in self.connections.items():
@@ -248,8 +251,8 @@ class Wiring:
         return next((other for other in inputs if self.port(other).unit == unit), None)
 
     def notes(self) -> list[str]:
-        """Return hints at possible mistakes: unconnected inputs, controllers without gains, algebraic loops."""
-        found = []
+        """Return the remarks and hints at possible mistakes: unconnected inputs, controllers without gains, algebraic loops."""
+        found = [*self.remarks]
         for name, part in self.parts.items():
             inputs = part.real_variables("input")
             served = {_table(i) for i in inputs if End(name, i) in self.connections or i in part.values}

@@ -28,7 +28,7 @@ from analysis.systems import (
     load_system,
     read_ssp,
     run_system,
-    ssp,
+    ssp_reader,
     write_ssp,
 )
 from analysis.systems.description import PartTable, RunTable
@@ -253,9 +253,9 @@ def test_enumerations_are_written_by_the_names_of_their_items(tmp_path: Path) ->
     values = unpacked(path) / "resources" / "linkage.ssv"
     xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd").validate(values)
     assert '<ssv:Enumeration value="speed" name="Drive"' in values.read_text(encoding="utf-8")
-    assert ssp._as_number("speed", mode, "drive.mode") == 1.0
+    assert ssp_reader._as_number("speed", mode, "drive.mode") == 1.0
     with pytest.raises(WiringError, match="it must be a number"):
-        ssp._as_number("fast", mode, "drive.mode")
+        ssp_reader._as_number("fast", mode, "drive.mode")
 
 
 def test_start_values_in_other_units_are_converted_or_refused(tmp_path: Path) -> None:
@@ -290,6 +290,36 @@ def test_a_part_that_nothing_is_connected_to_is_kept(tmp_path: Path) -> None:
     assert dict(read_ssp(path).parts["motor"].values) == dict(wiring.parts["motor"].values)
 
 
+COMMON = 'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0"'
+
+
+def parameters(**values: str) -> str:
+    """A parameter set; in names two underscores stand for a dot."""
+    rows = "".join(f'<ssv:Parameter name="{k.replace("__", ".")}">{v}</ssv:Parameter>' for k, v in values.items())
+    space = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+    inside = f"<ssv:Parameters>{rows}</ssv:Parameters>"
+    return f'<ssv:ParameterSet xmlns:ssv="{space}" {COMMON} name="set">{inside}</ssv:ParameterSet>'
+
+
+def mapping(*entries: tuple[str, str, str]) -> str:
+    rows = "".join(
+        f'<ssm:MappingEntry source="{s}" target="{t}">{inside}</ssm:MappingEntry>' for s, t, inside in entries
+    )
+    space = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+    return f'<ssm:ParameterMapping xmlns:ssm="{space}" {COMMON}>{rows}</ssm:ParameterMapping>'
+
+
+def bindings(*given: tuple[str, str, str]) -> str:
+    """Bindings of parameters: attributes, a set, and a mapping."""
+    rows = [
+        f"<ssd:ParameterBinding {attributes}><ssd:ParameterValues>{values}</ssd:ParameterValues>"
+        + (f"<ssd:ParameterMapping>{mapped}</ssd:ParameterMapping>" if mapped else "")
+        + "</ssd:ParameterBinding>"
+        for attributes, values, mapped in given
+    ]
+    return "".join(rows)
+
+
 def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
     entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
     text = entries["SystemStructure.ssd"].decode()
@@ -298,10 +328,22 @@ def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
     changed = f'{text[:end]}><ssc:LinearTransformation factor="-1"/></ssd:Connection>{text[end + 2 :]}'
     twice = text.replace("</ssd:Connections>", f"{text[start:end]}/></ssd:Connections>")
     for wrong, message in (
-        (changed, "LinearTransformation"),
+        (changed, "LinearTransformation of a connection"),
+        (changed.replace("Linear", "EnumerationMapping"), "EnumerationMappingTransformation of a connection"),
         (twice, "two connections"),
         ("", "no SystemStructure.ssd"),
-    ):
+        ("<", "is no XML"),
+        (text.replace('"CoSimulation"', '"ModelExchange"', 1), "motor asks for ModelExchange"),
+        (text.replace("x-fmu-sharedlibrary", "x-ssp-package", 1), "motor is of type application/x-ssp-package"),
+        (text.replace("resources/motor.ssv", "resources/rotor.ssv"), "'resources/rotor.ssv': it must be a file"),
+        (text.replace('<ssc:Real unit="rad/s"/>', '<ssc:Real unit="rpm"/>', 1), "is in rpm: it must be in rad/s"),
+        (text.replace("<ssd:Connections>", "<ssd:SignalDictionaries/><ssd:Connections>"), "SignalDictionaries"),
+        (text.replace("<ssd:Elements>", '<ssd:Elements><ssd:System name="more"/>', 1), "more is no FMU"),
+        (text.replace('<ssd:ParameterBinding source="resources/motor.ssv"/>',
+                      bindings(("", parameters(fieldDrive__mode='<ssv:Real value="0.5"/>'), ""))), "a whole number"),
+        (text.replace('<ssd:ParameterBinding source="resources/motor.ssv"/>',
+                      bindings(("", parameters(rotor__mass='<ssv:Real value="NaN"/>'), ""))), "'NaN': it must be a number"),
+    ):  # fmt: skip
         with zipfile.ZipFile(tmp_path / "wrong.ssp", "w") as archive:
             for name, content in entries.items():
                 if name != "SystemStructure.ssd":
@@ -340,6 +382,72 @@ def test_start_values_of_the_whole_system_through_a_mapping(tmp_path: Path) -> N
         for name, content in entries.items():
             archive.writestr(name, content)
     assert dict(read_ssp(tmp_path / "mapped.ssp").parts["linkage"].values) == {"slider.damping": 7.0}
+
+
+REVERSED = (
+    (
+        'startElement="motor" startConnector="shaft.exerted_torque"',
+        'startElement="linkage" startConnector="drive.torque"',
+    ),
+    ('endElement="linkage" endConnector="drive.torque"', 'endElement="motor" endConnector="shaft.exerted_torque"'),
+)
+
+
+def test_an_archive_of_another_tool_is_read_by_the_rules_of_the_standard(tmp_path: Path) -> None:
+    """Precedence of parameters, prefixes before mappings, FMUs of one name, ends in any order, files inside an FMU."""
+    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
+    text = entries["SystemStructure.ssd"].decode()
+    for part, old in (("motor", "InductionMotor-native.fmu"), ("linkage", "FiveBarSlider-native.fmu")):
+        entries[f"resources/{part} 1/model.fmu"] = entries.pop(f"resources/{old}")
+        text = text.replace(f"resources/{old}", f"resources/{part}%201/model.fmu")
+    (tmp_path / "inner.fmu").write_bytes(entries["resources/motor 1/model.fmu"])
+    with zipfile.ZipFile(tmp_path / "inner.fmu", "a") as fmu:
+        fmu.writestr("extra/set.ssv", parameters(shaft__damping='<ssv:Real value="0.25"/>'))
+    entries["resources/motor 1/model.fmu"] = (tmp_path / "inner.fmu").read_bytes()
+    linear = '<ssc:LinearTransformation factor="2" offset="1"/>'
+    table = '<ssc:IntegerMappingTransformation><ssc:MapEntry source="7" target="1"/></ssc:IntegerMappingTransformation>'
+    first = parameters(slider__damping='<ssv:Real value="1"/>', slider__stiffness='<ssv:Real value="100"/>')
+    later = parameters(slider__damping='<ssv:Real value="2"/>', gone='<ssv:Real value="1"/>')
+    own = parameters(d='<ssv:Float64 value="3"/>', mode='<ssv:Integer value="7"/>', rest='<ssv:Real value="9"/>')
+    mapped = mapping(("my.d", "slider.mass", linear), ("my.mode", "drive.mode", table))
+    linkage = bindings(("", first, ""), ("", later, ""), ('prefix="my."', own, mapped))
+    whole = parameters(
+        linkage__slider__stiffness='<ssv:Real value="500"/>',
+        nowhere__x='<ssv:Real value="5"/>',
+        push='<ssv:Real value="4"/>',
+    )
+    top = f"<ssd:ParameterBindings>{bindings(('', whole, ''))}</ssd:ParameterBindings>"
+    edge = '<ssd:Connectors><ssd:Connector name="push" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+    inside = '<ssd:Connection startConnector="push" endElement="linkage" endConnector="slider.force"/>'
+    for old, new in (
+        *REVERSED,
+        ('source="resources/motor.ssv"', 'source="extra/set.ssv" sourceBase="component"'),
+        ('<ssd:ParameterBinding source="resources/linkage.ssv"/>', linkage),
+        (
+            '<ssd:System name="system">',
+            f'<ssd:System name="system">{edge}{top}',
+        ),
+        ("</ssd:Connections>", f"{inside}</ssd:Connections>"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    entries["SystemStructure.ssd"] = text.encode()
+    with zipfile.ZipFile(tmp_path / "other.ssp", "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    wiring = read_ssp(tmp_path / "other.ssp")
+    assert wiring.connections == wiring_of("motor-crank").connections
+    values = {
+        "slider.damping": 2.0,
+        "slider.stiffness": 500.0,
+        "slider.mass": 7.0,
+        "drive.mode": 1.0,
+        "slider.force": 4.0,
+    }
+    assert values_of(wiring) == {"motor": {"shaft.damping": 0.25}, "linkage": values}
+    assert [part.description.modelName for part in wiring.parts.values()] == ["InductionMotor", "FiveBarSlider"]
+    left_out = [note for note in wiring.notes() if "left out" in note]
+    assert [note.split(" of ")[0] for note in left_out] == ["linkage: gone", "nowhere.x"]
 
 
 def test_the_commands(linkwork: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
