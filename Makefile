@@ -54,7 +54,7 @@ figures: $(RUN)
 
 bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
-	for part in solvers fmu stability synthesis slider_crank ensembles scaling; do $(BIN)/python -m benchmarks.$$part || exit; done
+	for part in solvers fmu stability synthesis ensembles scaling; do $(BIN)/python -m benchmarks.$$part || exit; done
 	$(BIN)/python -m benchmarks.precision docs
 
 # searches side by side on fifty targets, half an hour and more; it goes on with what is missing of out/race.csv

@@ -11,17 +11,19 @@ docs/fmu.md.
 from __future__ import annotations
 
 import argparse
-import csv
 import tempfile
 from collections.abc import Callable
-from math import cos, log2
+from math import cos, log2, sin
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from analysis.export import KINDS, build, build_native
 from analysis.mechanisms import MECHANISMS
 from linkwork.mechanism import Mechanism
+from tests.fmu import masters
 from tests.fmu.runner import run_in_process
+
+from . import tables
 
 RESULTS = Path(__file__).parents[1] / "docs" / "commanded.csv"
 #: Both communication steps (s), and the number of steps of a run at the first, longer one.
@@ -49,9 +51,9 @@ COMMANDS = (
 )
 
 
-# The masters: each function runs in a process of its own and imports there what it needs. It takes cases. A case has an FMU,
-# the fields of a `Command`, whether the rate is also set, the communication step, the number of steps, and the arguments of
-# a `Row`. The function returns the coordinate at the end of each case.
+# The masters that are not called step by step: each function runs in a process of its own and imports there what it needs. It
+# takes cases. A case has an FMU, the fields of a `Command`, whether the rate is also set, the communication step, the number of
+# steps, and the arguments of a `Row`. The function returns the coordinate at the end of each case.
 
 
 def by_fmpy(cases: list[Any]) -> list[float]:
@@ -89,83 +91,6 @@ def by_fmpy(cases: list[Any]) -> list[float]:
             output=[coordinate],
         )
         return float(rows[-1][coordinate])
-
-    return [run(*case) for case in cases]
-
-
-def by_libcosimpy(cases: list[Any]) -> list[float]:
-    """Run the cases by libcosim's fixed-step algorithm."""
-    from math import cos, sin
-
-    from fmpy import read_model_description
-    from libcosimpy.CosimExecution import CosimExecution
-    from libcosimpy.CosimManipulator import CosimManipulator
-    from libcosimpy.CosimObserver import CosimObserver
-    from libcosimpy.CosimSlave import CosimLocalSlave
-
-    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = command
-        reference = {v.name: v.valueReference for v in read_model_description(fmu).modelVariables}
-        execution = CosimExecution.from_step_size(round(step * 1e9))
-        slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="one"))
-        execution.add_observer(observer := CosimObserver.create_last_value())
-        execution.add_manipulator(override := CosimManipulator.create_override())
-        execution.real_initial_value(slave, reference[speed], a)
-        names = [speed, rate] if rated else [speed]
-        for n in range(count):
-            values = [a + b * sin(20.0 * n * step), 20.0 * b * cos(20.0 * n * step)]
-            override.slave_real_values(slave, [reference[name] for name in names], values[: len(names)])
-            assert execution.step(1)
-        return float(observer.last_real_values(slave, [reference[coordinate]])[0])
-
-    return [run(*case) for case in cases]
-
-
-def by_ecospy(cases: list[Any]) -> list[float]:
-    """Run the cases by ecos."""
-    from math import cos, sin
-
-    from ecospy import EcosSimulation, EcosSimulationStructure
-
-    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = command
-        with EcosSimulationStructure() as structure:
-            structure.add_model("one", fmu)
-            structure.add_parameter_set("case", {f"one::{speed}": a})
-            with EcosSimulation(structure=structure, step_size=step) as simulation:
-                simulation.init(parameter_set="case")
-                for n in range(count):
-                    simulation.set_real(f"one::{speed}", a + b * sin(20.0 * n * step))
-                    if rated:
-                        simulation.set_real(f"one::{rate}", 20.0 * b * cos(20.0 * n * step))
-                    simulation.step(1)
-                found = float(simulation.get_real(f"one::{coordinate}"))
-                simulation.terminate()
-        return found
-
-    return [run(*case) for case in cases]
-
-
-def by_cofmupy(cases: list[Any]) -> list[float]:
-    """Run the cases by CoFMUPy, which sets all inputs: to zero if an input is not connected."""
-    import sys
-    from math import cos, sin
-
-    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
-    from cofmupy import Coordinator
-
-    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = command
-        start = {"drive.speed": 5.0} | {speed: a}
-        one = {"id": "one", "name": "one", "path": fmu, "initialization": start}
-        coordinator = Coordinator()
-        coordinator.start({"fmus": [one], "connections": [], "cosim_method": "jacobi", "iterative": False})
-        for n in range(count):
-            given = {speed: [a + b * sin(20.0 * n * step)]}
-            if rated:
-                given[rate] = [20.0 * b * cos(20.0 * n * step)]
-            coordinator.master.do_step(step, input_dict={"one": given})
-        return float(coordinator.master.fmu_handlers["one"].get_variable(coordinate)[0])
 
     return [run(*case) for case in cases]
 
@@ -224,6 +149,24 @@ def by_cosimulate(cases: list[Any]) -> list[float]:
     return [run(*case) for case in cases]
 
 
+def by_steps(by: Callable[..., Any], cases: list[Any]) -> list[float]:
+    """Run the cases by a function of `tests.fmu.masters`, which calls a master step by step."""
+
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = command
+        given = [
+            {speed: a + b * sin(20.0 * n * step)} | ({rate: 20.0 * b * cos(20.0 * n * step)} if rated else {})
+            for n in range(count)
+        ]
+        # CoFMUPy sets an input that is not connected to zero
+        starts = ({"drive.speed": 5.0} if by is masters.by_cofmupy else {}) | {speed: a}
+        case = [starts, {}, "", 0.0]
+        found = run_in_process(by, fmu, case, [coordinate], "", step, given, options=(), timeout=300.0)
+        return float(found["end"][coordinate])
+
+    return [run(*case) for case in cases]
+
+
 class Row(NamedTuple):
     """A row of the table: a master with one interface, on FMUs of some kinds.
 
@@ -233,7 +176,7 @@ class Row(NamedTuple):
     master: str
     interface: str
     kinds: tuple[str, ...]
-    by: Callable[[list[Any]], list[float]]
+    by: Callable[..., Any]
     arguments: tuple[str, ...] = ()
     sets_rate: bool = False
 
@@ -244,9 +187,9 @@ ROWS = (
     Row("FMPy", _STEPS, tuple(KINDS), by_fmpy),
     Row("FMPy", f"{_STATES}, Euler", BOTH, by_fmpy, ("ModelExchange", "Euler")),
     Row("FMPy", f"{_STATES}, CVode", BOTH, by_fmpy, ("ModelExchange", "CVode")),
-    Row("libcosimpy", _STEPS, ("native",), by_libcosimpy),
-    Row("ecospy", _STEPS, BOTH, by_ecospy),
-    Row("CoFMUPy", _STEPS, BOTH, by_cofmupy),
+    Row("libcosimpy", _STEPS, ("native",), masters.by_libcosimpy),
+    Row("ecospy", _STEPS, BOTH, masters.by_ecospy),
+    Row("CoFMUPy", _STEPS, BOTH, masters.by_cofmupy),
     Row("PathSim", _STEPS, BOTH, by_pathsim),
     Row("PathSim", f"{_STATES}, RK4", BOTH, by_pathsim, ("RK4",)),
     Row("PathSim", f"{_STATES}, RKDP54", BOTH, by_pathsim, ("RKDP54",)),
@@ -314,7 +257,9 @@ def measure_master(master: str, folder: Path) -> Table:
         for row, c, rated, kind in looked
         for h in STEPS
     ]
-    ends = run_in_process(looked[0][0].by, cases, options=(), timeout=3000.0)
+    by = looked[0][0].by
+    stepwise = by.__module__ == masters.__name__
+    ends = by_steps(by, cases) if stepwise else run_in_process(by, cases, options=(), timeout=3000.0)
     table: dict[Row, dict[str, str]] = {}
     for n, (row, command, rated, kind) in enumerate(looked):
         found = table.setdefault(row, {"master": row.master, "interface": row.interface} | dict.fromkeys(COLUMNS, ""))
@@ -327,26 +272,6 @@ def measure_master(master: str, folder: Path) -> Table:
     return [{name: said or "-" for name, said in found.items()} for found in table.values()]
 
 
-def read(path: Path) -> Table:
-    """Read the table of results from a CSV file."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def write(path: Path, table: Table) -> None:
-    """Write the table of results to a CSV file."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.DictWriter(file, list(table[0]), lineterminator="\n")
-        rows.writeheader()
-        rows.writerows(table)
-
-
-def markdown(table: Table) -> str:
-    """Return the table in Markdown, as docs/fmu.md shows it."""
-    rows = [list(table[0]), ["---"] * len(table[0]), *(list(row.values()) for row in table)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = tuple(dict.fromkeys(row.master for row in ROWS))
@@ -356,6 +281,7 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
         folder = (chosen.fmus or Path(place)).resolve()
         table = [row for master in chosen.master or names for row in measure_master(master, folder)]
+    headings, rows = list(table[0]), [row.values() for row in table]
     if not chosen.master:
-        write(RESULTS, table)
-    print(markdown(table))
+        tables.write(RESULTS, headings, rows)
+    print(tables.markdown(headings, rows))

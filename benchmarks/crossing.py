@@ -13,7 +13,6 @@ constraint.
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import count
 from math import inf, tau
@@ -37,6 +36,7 @@ from analysis.synthesis.task.constraint import USUAL, Constraint
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 
+from . import tables
 from .black_box import PENALTY, BlackBox, evolve, minimise_score
 
 FloatArray = NDArray[np.float64]
@@ -202,31 +202,23 @@ def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
 
 def read(path: Path) -> list[Row]:
     """Read the rows of results from a file."""
-    with path.open(newline="", encoding="utf-8") as file:
-        _, *rows = csv.reader(file)
-    return [Row(row[0], row[1], *map(float, row[2:])) for row in rows]
+    rows = ([*row.values()] for row in tables.read(path))
+    return [Row(target, asked, *map(float, numbers)) for target, asked, *numbers in rows]
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
     """Write the rows of results to a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["target", "asked", "synthesize [m2]", "evolution [m2]", "synthesize [s]"])
-        table.writerows([*row[:2], *(f"{value:.6g}" for value in row[2:])] for row in rows)
+    headings = ["target", "asked", "synthesize [m2]", "evolution [m2]", "synthesize [s]"]
+    tables.write(path, headings, ([*row[:2], *(f"{value:.6g}" for value in row[2:])] for row in rows))
 
 
 def markdown(rows: Iterable[Row]) -> str:
     """Return the table of results in Markdown."""
-    lines = [
-        f"| {row.target} | {row.asked} | {row.ours:.4g} | {row.evolution:.4g} | {row.ours / row.evolution - 1.0:+.1%} |"
+    lines = (
+        [row.target, row.asked, f"{row.ours:.4g}", f"{row.evolution:.4g}", f"{row.ours / row.evolution - 1.0:+.1%}"]
         for row in rows
-    ]
-    heads = [
-        "| target | asked | `synthesize` [m2] | evolution [m2] | ours over evolution's |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    return "\n".join([*heads, *lines])
+    )
+    return tables.markdown(["target", "asked", "`synthesize` [m2]", "evolution [m2]", "ours over evolution's"], lines)
 
 
 def main(path: Path, names: Sequence[str], budget: float) -> None:

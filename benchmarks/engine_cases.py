@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from linkwork.five_bar.dynamics import Inputs, derivative
+from analysis import Inputs, TorsionBar, Trajectory, simulate
+from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, link_angles, position
-from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.five_bar.parameters import Constants, FiveBarParameters, InitialState
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
 
 
@@ -49,6 +50,11 @@ class Case:
     def start_speed(self) -> float:
         """Crank speed at the start (rad/s)."""
         return self.crank_speed or 0.0
+
+    @property
+    def inputs(self) -> Inputs:
+        """Inputs of a run in process."""
+        return Inputs(speed=self.crank_speed) if self.crank_speed else Inputs(torque=TorsionBar(torque=self.torque))
 
 
 def step_count(interval: float, time_step: float) -> int:
@@ -99,18 +105,28 @@ def reference(case: Case) -> np.ndarray:
     return result
 
 
-def run_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
+def run_in_process(case: Case, tolerance: float) -> Trajectory:
+    """Run a case by the compiled solver."""
+    start = InitialState(crank_speed=case.start_speed)
+    return simulate(case.parameters, case.inputs, initial=start, samples=case.times, tolerance=tolerance)
+
+
+def run_scipy(case: Case, method: str, rtol: float, atol: float | None = None) -> np.ndarray:
     """Compute the slider position (m) by `solve_ivp` on the reduced equations in plain Python; NaN if the method fails.
 
-    Only the four mechanical states are integrated; the torque is switched off at an event.
+    Only the four mechanical states are integrated; the torque is switched off at an event. By default ``atol`` is ``rtol``
+    times the magnitudes of the states.
     """
+    length = case.parameters.crank_length
+    scale = np.array([1.0, length, max(1.0, case.start_speed), length * 40.0])
     p = case.parameters.constants()
     speed_drive = 0.0 if case.crank_speed is None else 1.0
 
     def rate(_: float, x: np.ndarray, torque: float) -> tuple[float, ...]:
         th2, u, w2, v = x.tolist()
         applied = torque * (1.0 - th2 / case.switch_angle)
-        return derivative((th2, u, w2, v, 0.0, 0.0), Inputs(speed_drive, applied, 0.0, 0.0, 0.0, 0.0), p)[:4]
+        inputs = dynamics.Inputs(speed_drive, applied, 0.0, 0.0, 0.0, 0.0)
+        return dynamics.derivative((th2, u, w2, v, 0.0, 0.0), inputs, p)[:4]
 
     def switch(_: float, x: np.ndarray, torque: float) -> float:
         return x[0] - case.switch_angle
@@ -129,7 +145,7 @@ def run_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) ->
             events=switch if torque else None,
             args=(torque,),
             rtol=rtol,
-            atol=atol,
+            atol=rtol * scale if atol is None else atol,
         )
         u.extend(leg.y[1])
         if leg.status != 1:

@@ -1,14 +1,11 @@
-"""Time the five-bar slider in two general multibody engines, MuJoCo and Exudyn, at a stated accuracy.
+"""Run the five-bar slider in two general multibody engines, MuJoCo and Exudyn, and measure time and error.
 
 Each engine gets the formulation, the integrator and the solver settings that reach the accuracy in the shortest time. In MuJoCo
 the closed loop is a tree of relative joints with one closing pin; in Exudyn it is planar bodies with three pins. No Python code
 runs inside the integration. Accuracy is that of `benchmarks.engine_cases`.
 
-    python -m benchmarks.engines
-
-prints steps, errors and times of both engines for both cases. It needs Exudyn 1.13 or later and MuJoCo 3.7 or later, whose
-``connect`` constraint includes the velocity term J' q'. Without this term the model is of no use: the error of u in MuJoCo 3.6
-is 70 %.
+This needs Exudyn 1.13 or later and MuJoCo 3.7 or later, whose ``connect`` constraint includes the velocity term J' q'. Without
+this term the model is of no use: the error of u in MuJoCo 3.6 is 70 %.
 """
 
 from __future__ import annotations
@@ -17,15 +14,13 @@ import contextlib
 import io
 import sys
 from collections.abc import Callable, Iterator
-from functools import partial
 from math import ceil, cos, inf, log, sin
 from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.accuracy import loosest_setting
-from benchmarks.engine_cases import CASES, Case, EngineRun, centre, relative_error, start, step_count
+from benchmarks.engine_cases import Case, EngineRun, centre, relative_error, start, step_count
 from linkwork.five_bar.parameters import Constants
 
 Run = Callable[[Case, float], EngineRun]
@@ -456,42 +451,11 @@ def fastest_run(run: Run, case: Case, time_step: float, repeats: int = 7) -> Eng
 
 
 class Engine(NamedTuple):
-    """An engine: its run, the first and last time step of a series (s), and the run of least error with its time step (s)."""
+    """An engine: its run, and the first and last time step of a series (s)."""
 
     run: Run
     first_step: float
     last_step: float
-    finest_run: Run
-    finest_step: float
 
 
-ENGINES: tuple[Engine, ...] = (
-    Engine(run_mujoco, 2e-3, 1e-5, partial(run_mujoco, iterations=2), 4e-5),
-    Engine(run_exudyn, 1e-3, 5e-6, partial(run_exudyn, newton_tolerance=1e-9), 2e-6),
-)
-
-
-def main() -> None:
-    """Print step, error and time of each engine and case: for a series of steps, at the accuracy, and at the finest step."""
-
-    def line(case: Case, remark: str, time_step: float, result: EngineRun) -> None:
-        print(
-            f"{case.name:15} {result.label:18} {remark:10} {time_step:9.3e} s {result.steps:8d}"
-            f"  {result.error:8.2e}  {1e3 * result.seconds:9.2f} ms"
-        )
-
-    print(f"{'case':15} {'engine':18} {'':10} {'step':>11} {'steps':>8}  {'error':>8}  {'time':>12}")
-    for case in CASES:
-        for engine in ENGINES:
-            for step in time_steps(case, engine.first_step, engine.last_step, 0.25):
-                line(case, "", step, fastest_run(engine.run, case, step, 3))
-            series = time_steps(case, engine.first_step, engine.last_step)
-            choice = loosest_setting(lambda step, e=engine, c=case: e.run(c, step).error, series)
-            best = fastest_run(engine.run, case, choice.setting)
-            line(case, "<= 1e-6" if choice.reached else "best", choice.setting, best)
-            step = next(time_steps(case, engine.finest_step, engine.finest_step))
-            line(case, "finest", step, engine.finest_run(case, step))
-
-
-if __name__ == "__main__":
-    main()
+ENGINES: tuple[Engine, ...] = (Engine(run_mujoco, 2e-3, 1e-5), Engine(run_exudyn, 1e-3, 5e-6))

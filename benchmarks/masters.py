@@ -10,11 +10,10 @@ it on to that library. `docs/generate.py` puts the table into docs/masters.md.
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,6 +26,8 @@ from tests.fmu.spy import changed, watched
 from tests.fmu.test_masters import CASES, COMMANDED, STATES, STEPS
 from tests.systems import masters as together
 from tests.systems.conftest import started_in_its_modes, system_of
+
+from . import tables
 
 RESULTS = Path(__file__).parents[1] / "docs" / "masters.csv"
 YES, NO, NONE = "yes", "no", "-"
@@ -210,22 +211,12 @@ Table = dict[str, dict[str, str]]
 
 def read(path: Path) -> Table:
     """Read the table of results, by master and capability."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return {row.pop("master"): row for row in csv.DictReader(file)}
-
-
-def write(path: Path, table: Table) -> None:
-    """Write the table of results."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.DictWriter(file, ["master", *(c.name for c in CAPABILITIES)], lineterminator="\n")
-        rows.writeheader()
-        rows.writerows({"master": master, **found} for master, found in table.items())
+    return {row.pop("master"): row for row in tables.read(path)}
 
 
 def markdown(table: Table) -> str:
     """Return the table in Markdown, with a column for each master."""
-    rows: Iterable[Sequence[str]] = [(c.name, *(found[c.name] for found in table.values())) for c in CAPABILITIES]
-    return "\n".join(f"| {' | '.join(row)} |" for row in [("", *table), ["---"] * (len(table) + 1), *rows])
+    return tables.markdown(["", *table], ((c.name, *(found[c.name] for found in table.values())) for c in CAPABILITIES))
 
 
 if __name__ == "__main__":
@@ -235,5 +226,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
         table = {master: find(master, Path(place)) for master in chosen or RUNS}
     if not chosen:
-        write(RESULTS, table)
+        headings = ["master", *(c.name for c in CAPABILITIES)]
+        tables.write(RESULTS, headings, ([master, *found.values()] for master, found in table.items()))
     print(markdown(table))

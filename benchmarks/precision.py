@@ -21,14 +21,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Inputs, TorsionBar, simulate, simulate_many
+from analysis import Inputs, simulate, simulate_many
 from analysis.figures import Curve, Panel, plot_curves
 from analysis.figures.style import COLOURS
 from benchmarks import engines
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, shortest_time
-from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
+from benchmarks.engine_cases import CASES, Case, relative_error, run_in_process, run_scipy
 from benchmarks.ensembles import integration_time, without_lanes
-from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 #: Tolerances of the solvers.
@@ -48,12 +47,7 @@ class Point(NamedTuple):
 
 def measure_in_process(case: Case, part: str) -> list[Point]:
     """Measure the compiled solver at all tolerances: the "integration" alone, or the "whole" call with all outputs."""
-    inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
-    start = InitialState(crank_speed=case.start_speed)
-
-    def run(tolerance: float) -> Any:
-        return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
-
+    run = partial(run_in_process, case)
     measure_time = shortest_time if part == "whole" else integration_time
     points = []
     for tolerance in TOLERANCES.tolist():
@@ -62,20 +56,10 @@ def measure_in_process(case: Case, part: str) -> list[Point]:
     return points
 
 
-def measure_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int = 2) -> list[Point]:
-    """Measure a solver at every other one of `TOLERANCES`; ``run`` returns the slider position (m) at a tolerance."""
-    points = []
-    for tolerance in TOLERANCES[::2].tolist():
-        error = relative_error(case, run(tolerance))
-        points.append(Point(error, shortest_time(partial(run, tolerance), repeats)))
-    return points
-
-
 def measure_scipy(case: Case, method: str) -> list[Point]:
-    """Measure one of SciPy's methods on the right-hand side in plain Python."""
-    length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
-    scale = np.array([1.0, length, speed, length * 40.0])
-    return measure_tolerances(case, lambda rtol: run_scipy(case, method, rtol, rtol * scale))
+    """Measure one of SciPy's methods on the right-hand side in plain Python, at every other one of `TOLERANCES`."""
+    runs = [partial(run_scipy, case, method, tolerance) for tolerance in TOLERANCES[::2].tolist()]
+    return [Point(relative_error(case, run()), shortest_time(run, 2)) for run in runs]
 
 
 def measure_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Point]:

@@ -18,8 +18,6 @@ satisfies the constraints. The file is rewritten after every row. A run that is 
 from __future__ import annotations
 
 import argparse
-import csv
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from itertools import count
@@ -34,6 +32,7 @@ from threadpoolctl import threadpool_limits
 from analysis.synthesis import InfeasibleError, Search, synthesize
 from analysis.synthesis.search.start import make_start
 
+from . import tables
 from .black_box import BlackBox
 from .contest import (
     BlackBoxSearch,
@@ -128,22 +127,14 @@ def prepare_searches() -> None:
 
 def read(path: Path) -> list[Row]:
     """Read the rows of a file; return an empty list if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        _, *rows = csv.reader(file)
+    rows = ([*row.values()] for row in tables.read(path)) if path.exists() else ()
     return [Row(kind, name, by, float(exact), tuple(map(float, errors))) for kind, name, by, exact, *errors in rows]
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
-    """Write rows to a file; the old file is replaced in one operation."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f"{path.name}.new")
-    with beside.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["kind", "target", "search", "exact", *(f"{seconds:g} s" for seconds in TIMES)])
-        table.writerows([*row[:3], *(f"{value:.6g}" for value in (row.exact, *row.errors))] for row in rows)
-    os.replace(beside, path)
+    """Write rows to a file."""
+    headings = ["kind", "target", "search", "exact", *(f"{seconds:g} s" for seconds in TIMES)]
+    tables.write(path, headings, ([*row[:3], *(f"{v:.6g}" for v in (row.exact, *row.errors))] for row in rows))
 
 
 def sort_rows(rows: Iterable[Row]) -> list[Row]:
@@ -258,7 +249,7 @@ def markdown(rows: Sequence[Row], part: str) -> str:
         "standings": (["s", "Linkwork ahead", "of these level", *RACERS], standings),
         "targets": (["kind", "target", *RACERS], finals),
     }[part]
-    return "\n".join(f"| {' | '.join(line)} |" for line in (headings, ["---"] * len(headings), *lines(rows)))
+    return tables.markdown(headings, lines(rows))
 
 
 def picture(rows: Sequence[Row]) -> Any:

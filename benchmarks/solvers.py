@@ -12,13 +12,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Inputs, TorsionBar, simulate
 from benchmarks import engines
 from benchmarks.accuracy import (
     ACCURACY,
@@ -28,9 +26,8 @@ from benchmarks.accuracy import (
     right_hand_side_time,
     shortest_time,
 )
-from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
+from benchmarks.engine_cases import CASES, Case, relative_error, run_in_process, run_scipy
 from benchmarks.ensembles import integration_time
-from linkwork.five_bar.parameters import InitialState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,26 +45,14 @@ def time_in_process(case: Case) -> tuple[list[Timing], str]:
 
     The timings are of the integration alone and of the whole call of `simulate`.
     """
-    inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
-    initial, times = InitialState(crank_speed=case.start_speed), case.times
-
-    def run(tolerance: float) -> Any:
-        return simulate(
-            case.parameters,
-            inputs,
-            initial=initial,
-            stop_time=case.duration,
-            samples=times,
-            tolerance=tolerance,
-        )
-
+    run = partial(run_in_process, case)
     found = loosest_setting(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
     assert found.reached, "the in-process solver does not reach the accuracy"
     whole = shortest_time(lambda: run(found.setting), 50)
     inner = integration_time(lambda: run(found.setting), 50)
     statistics = run(found.setting).statistics
     steps, evaluations = int(statistics["steps"]), int(statistics["evaluations"])
-    bare = right_hand_side_time(case.parameters, inputs, _states(case)) * evaluations
+    bare = right_hand_side_time(case.parameters, case.inputs, _states(case)) * evaluations
     note = f"tolerance {found.setting:.1e}, {steps} steps, {evaluations} evaluations"
     timings = [
         Timing(solver="in process, the integration", seconds=inner, error=found.error, note=note),
@@ -88,14 +73,9 @@ def _states(case: Case) -> np.ndarray:
 
 def time_scipy(case: Case) -> Timing:
     """Time `solve_ivp` on the right-hand side in plain Python, with the method that reaches the accuracy soonest."""
-    length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
-    scale = np.array([1.0, length, speed, length * 40.0])
     timings = []
     for method in SCIPY_METHODS:
-
-        def run(rtol: float, method: str = method) -> np.ndarray:
-            return run_scipy(case, method, rtol, rtol * scale)
-
+        run = partial(run_scipy, case, method)
         rtol, error, reached = loosest_setting(lambda rtol, run=run: relative_error(case, run(rtol)), TOLERANCES)
         if reached:
             timings.append(

@@ -159,9 +159,10 @@ def masters(of: str, page: str) -> str:
 
 def commanded(of: str, page: str) -> str:
     """Return the table of docs/commanded.csv."""
-    from benchmarks.commanded import markdown, read
+    from benchmarks.tables import markdown, read
 
-    return markdown(read(HERE / "commanded.csv"))
+    table = read(HERE / "commanded.csv")
+    return markdown(list(table[0]), (row.values() for row in table))
 
 
 def sentences() -> str:

@@ -261,9 +261,7 @@ def save_plot(wanted: bool, result: Any, path: str | Path, **options: Any) -> li
     return [save_figure(figures.plot(result, **options), path)] if wanted else []
 
 
-plot_option = click.option("--plot/--no-plot", "--plots/--no-plots", default=True, help="Whether to write a plot.")
-#: Option of commands that write several plots.
-plots_option = click.option("--plots/--no-plots", "--plot/--no-plot", default=True, help="Whether to write plots.")
+plot_option = click.option("--plot/--no-plot", "--plots/--no-plots", default=True, help="Whether to write plots.")
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:

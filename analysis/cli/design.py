@@ -44,7 +44,7 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add to a command the options that all commands with a search have: plots, folder, workers, seed, objective."""
     for option in (
-        common.plots_option,
+        common.plot_option,
         common.out_option(help="Folder for the results."),
         common.workers_options(),
         click.option(

@@ -21,7 +21,7 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
     "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
 @click.option("--count", type=click.IntRange(1), default=6, help="Number of linkages to report for four poses.")
-@common.plots_option
+@common.plot_option
 @common.out_option(help="Folder for the results.")
 @common.report_errors
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:

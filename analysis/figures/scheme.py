@@ -194,8 +194,9 @@ def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
         return finish(figure)
 
 
-def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: str = "") -> Figure:
+def plot_schemes(mechanisms: Sequence[Mechanism]) -> Figure:
     """Draw several planar mechanisms at their start, with the paths of their points through the range of the first freedom."""
+    columns = 4
     rows = -(-len(mechanisms) // columns)
     with figure_style():
         figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
@@ -206,7 +207,6 @@ def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: st
             draw(axis, mechanism, known.parameters, at, letters=False)
             axis.set_axis_off()
             axis.set_title(mechanism.name, fontsize=SMALL)
-        write_title(figure, title)
         return finish(figure)
 
 

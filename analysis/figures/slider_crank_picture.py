@@ -176,9 +176,9 @@ class _Scene:
         self.covered = np.empty((0, 2))
         self.lines: list[FloatArray] = []
 
-    def guide_point(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-        """Return the point (3,), in the ground frame, at a slider position, displaced by x and y along i and j of frame 4."""
-        return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
+    def guide_point(self, slide: float, x: float = 0.0) -> FloatArray:
+        """Return the point (3,), in the ground frame, at a slider position, displaced by x along i of frame 4."""
+        return np.asarray(self.foot + np.array([x, 0.0, -slide]) @ self.frame4)
 
     def page(self, points: ArrayLike) -> FloatArray:
         """Project points (..., 3) of the ground frame onto the page, (..., 2)."""

@@ -253,7 +253,9 @@ def inverse_dynamics(
         If the links cannot be joined somewhere on the turn; the message gives the crank angle.
     """
     check_speed(crank_speed)
-    samples = whole_number(samples, "samples of a turn")
+    if not float(samples).is_integer():
+        raise InputError(f"{samples} samples of a turn: it must be a whole number")
+    samples = int(samples)
     least = max(LEAST_SAMPLES, 2 * slider.order + 1)
     if samples < least:
         raise InputError(f"{samples} samples of a turn: a motion of order {slider.order} needs at least {least}")
@@ -288,13 +290,6 @@ def check_speed(crank_speed: float) -> None:
     """Raise InputError if a constant crank speed (rad/s) is zero or not finite."""
     if not (isfinite(crank_speed) and crank_speed != 0.0):
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
-
-
-def whole_number(value: float, what: str) -> int:
-    """Return a whole number as an int; raise InputError, which names the quantity as ``what``, if the value is not whole."""
-    if not float(value).is_integer():
-        raise InputError(f"{value} {what}: it must be a whole number")
-    return int(value)
 
 
 def load_at_angle(load: Load, crank_angle: float) -> tuple[float, float]:

@@ -40,4 +40,3 @@ from .workspace import CouplerCurve as CouplerCurve
 from .workspace import accessible as accessible
 from .workspace import accessible_area as accessible_area
 from .workspace import coupler_curve as coupler_curve
-from .workspace import coupler_curves as coupler_curves

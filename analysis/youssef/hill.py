@@ -351,7 +351,7 @@ class Region:
         return self.high - self.low
 
 
-def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
+def hill_regions(equation: PeriodicEquation, count: int) -> Mapping[int, Region]:
     """Return the regions of instability N = 1 to ``count`` that damping has not removed, by their number N.
 
     Parameters
@@ -360,14 +360,12 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
         Equation with a > 0.
     count : int
         Number of the last region.
-    order : int, optional
-        Highest harmonic.
     """
     found = {}
     for multiplier in (1, -1):
         # the least boundary of the multiplier +1 is single: below it the motion diverges
         alone = 1 if multiplier == 1 else 0
-        values = boundary_stiffnesses(equation, multiplier, count=count + 2 + alone, order=order)[alone:]
+        values = boundary_stiffnesses(equation, multiplier, count=count + 2 + alone)[alone:]
         for pair in range((count + 1) // 2 if multiplier == -1 else count // 2):
             low, high = values[2 * pair : 2 * pair + 2]
             number = 2 * pair + (1 if multiplier == -1 else 2)
@@ -463,10 +461,10 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     return Region(number=number, low=float(ends[0].real), high=float(ends[1].real))
 
 
-def perturbed_removing_damping(equation: PeriodicEquation, number: int, *, order: int = 2) -> float:
+def perturbed_removing_damping(equation: PeriodicEquation, number: int) -> float:
     """Return the damping lambda_c that removes the region N of an undamped equation: the region's width divided by N.
 
     The factor of lambda_c in the equation is assumed to have the same mean as s, the factor of the stiffness.
     """
-    region = perturbed_region(equation, number, order=order)
+    region = perturbed_region(equation, number)
     return region.width / number if region else 0.0

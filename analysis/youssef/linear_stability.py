@@ -13,7 +13,7 @@ from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..mechanisms import FIVE_BAR
 from ..numerics.boundaries import Test
-from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, plane_test, verdict
+from ..periodic import Drive, Monodromy, Plane, StabilityVerdict, multipliers, plane_test, verdict
 from ..run import takes_published
 from .hill import PeriodicEquation, monodromy
 from .linearisation import Load, Variant, slider_equation
@@ -43,11 +43,9 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
 
 
 @takes_published()
-def linear_verdict(
-    parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
-) -> StabilityVerdict:
+def linear_verdict(parameters: FiveBarParameters, drive: Drive) -> StabilityVerdict:
     """Judge the stability of u = 0 by the linear equation; `PeriodicOrbit.verdict` judges the true motion."""
-    return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
+    return verdict(multipliers(monodromy(linear_equation(parameters, drive))))
 
 
 def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:

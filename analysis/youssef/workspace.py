@@ -151,13 +151,6 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     return CouplerCurve(slider_position=slider_position, arcs=tuple(arcs), closed=closed)
 
 
-@takes_published()
-@in_si(slider_positions="m")
-def coupler_curves(parameters: FiveBarParameters, slider_positions: Amount, n: int = 720) -> tuple[CouplerCurve, ...]:
-    """Return the family of coupler curves at several slider positions (m); see `coupler_curve`."""
-    return tuple(coupler_curve(parameters, float(u), n) for u in slider_positions)
-
-
 def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
     """Return the ranges (begin, end) of crank angles (rad) in which the links can be joined at slider position u.
 
@@ -315,7 +308,7 @@ def accessible_area(
 
 def _sample_points(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
     """Return the points P (m) at configurations spread over crank angle and slider position, shape (k, 2)."""
-    curves = coupler_curves(parameters, np.linspace(low, high, 33).tolist(), n=120)
+    curves = (coupler_curve(parameters, u, 120) for u in np.linspace(low, high, 33).tolist())
     arcs = [np.column_stack([arc.x, arc.y]) for curve in curves for arc in curve.arcs]
     return np.concatenate(arcs) if arcs else np.empty((0, 2))
 

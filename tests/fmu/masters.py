@@ -3,7 +3,7 @@
 Each function runs in a process of its own and imports there what it needs. It runs a case for 100 steps of 1 ms. A case has the
 start values of reals and of integers, the name of an input that changes after 50 steps, and its new value. The result has the
 outputs at the end as ``end``, the time and `solver.status` if the master tells them, and the messages that reach the user as
-``said``.
+``said``. Masters that are called step by step also take another step, and ``given``, the inputs that change before each step.
 """
 
 from __future__ import annotations
@@ -99,7 +99,9 @@ def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> 
     return {"end": {name: float(run[-1][name]) for name in outputs}, "time": float(run[-1]["time"])}
 
 
-def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
+def by_libcosimpy(
+    fmu: str, case: list[Any], outputs: list[str], kind: str, step: float = 1e-3, given: list[Any] | None = None
+) -> Any:
     """Run the case by libcosim's fixed-step algorithm."""
     import zipfile
     from xml.etree import ElementTree
@@ -111,11 +113,12 @@ def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> A
     from libcosimpy.CosimSlave import CosimLocalSlave
 
     reals, integers, changed, later = case
+    given = given or [{changed: later} if k == 50 else {} for k in range(100)]
 
     log_output_level(CosimLogLevel.DEBUG)
     root = ElementTree.fromstring(zipfile.ZipFile(fmu).read("modelDescription.xml"))
     reference = {v.get("name"): int(v.get("valueReference")) for v in root.find("ModelVariables")}
-    execution = CosimExecution.from_step_size(1_000_000)  # ns
+    execution = CosimExecution.from_step_size(round(step * 1e9))
     slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="slider"))
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
@@ -125,9 +128,10 @@ def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> A
         assert execution.real_initial_value(slave, reference[name], value)
     for name, value in integers.items():
         assert execution.integer_initial_value(slave, reference[name], value)
-    assert execution.step(50)
-    override.slave_real_values(slave, [reference[changed]], [later])
-    good = execution.step(50)
+    good = True
+    for values in given:
+        override.slave_real_values(slave, [reference[name] for name in values], list(values.values()))
+        good = good and execution.step(1)
     return {
         "end": dict(zip(outputs, observer.last_real_values(slave, [reference[name] for name in outputs]))),
         "time": execution.status().current_time * 1e-9,
@@ -136,20 +140,24 @@ def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> A
     }
 
 
-def by_ecospy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
+def by_ecospy(
+    fmu: str, case: list[Any], outputs: list[str], kind: str, step: float = 1e-3, given: list[Any] | None = None
+) -> Any:
     """Run the case by ecos."""
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     reals, integers, changed, later = case
+    given = given or [{changed: later} if k == 50 else {} for k in range(100)]
 
     with EcosSimulationStructure() as structure:
         structure.add_model("slider", fmu)
         structure.add_parameter_set("case", {f"slider::{name}": value for name, value in (reals | integers).items()})
-        with EcosSimulation(structure=structure, step_size=1e-3) as simulation:
+        with EcosSimulation(structure=structure, step_size=step) as simulation:
             simulation.init(parameter_set="case")
-            simulation.step(50)
-            simulation.set_real(f"slider::{changed}", later)
-            time = simulation.step(50)
+            for values in given:
+                for name, value in values.items():
+                    simulation.set_real(f"slider::{name}", value)
+                time = simulation.step(1)
             found = {
                 "end": {name: simulation.get_real(f"slider::{name}") for name in outputs},
                 "time": time,
@@ -160,11 +168,14 @@ def by_ecospy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     return found
 
 
-def by_cofmupy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
+def by_cofmupy(
+    fmu: str, case: list[Any], outputs: list[str], kind: str, step: float = 1e-3, given: list[Any] | None = None
+) -> Any:
     """Run the case by CoFMUPy, which sets only Reals, and all inputs: to zero if it is given no value."""
     import sys
 
     reals, integers, changed, later = case
+    given = given or [{changed: later} if k == 50 else {} for k in range(100)]
 
     sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
     from cofmupy import Coordinator
@@ -175,10 +186,10 @@ def by_cofmupy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     coordinator = Coordinator()
     coordinator.start({"fmus": [slider], "connections": [], "cosim_method": "jacobi", "iterative": False})
     said = []
-    for step in range(100):
-        inputs = {"slider": {changed: [later]}} if step == 50 else None
+    for values in given:
+        inputs = {"slider": {name: [value] for name, value in values.items()}} if values else None
         try:
-            coordinator.master.do_step(1e-3, input_dict=inputs)
+            coordinator.master.do_step(step, input_dict=inputs)
         except FMICallException as error:
             said.append(str(error))
             break

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.commanded import RESULTS, ROWS, measure_master, read
+from benchmarks.commanded import RESULTS, ROWS, measure_master
+from benchmarks.tables import read
 
 from .test_masters import SLOW, need
 

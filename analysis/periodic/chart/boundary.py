@@ -66,9 +66,6 @@ def follow_crossing(
     *,
     x: tuple[float, float],
     y: tuple[float, float],
-    first: float = 2e-3,
-    greatest: float = 0.3,
-    widest: float = 4e-2,
     most_points: int = 300,
 ) -> CrossingCurve:
     """Follow a curve of folds, period doublings or torus points in both directions, up to the edges of a box in a plane.
@@ -85,9 +82,6 @@ def follow_crossing(
         Values of the two parameters for this orbit.
     x, y : (float, float)
         Ranges of the two parameters, which form the box.
-    first, greatest, widest : float
-        First and greatest step in scaled arc length, in which each side of the box has length 1 and the crank's length counts
-        as 1; and the greatest step along one side of the box.
     most_points : int
         Greatest number of points in each direction.
 
@@ -101,8 +95,9 @@ def follow_crossing(
     if kind is Crossing.BRANCH_POINT:
         raise InputError("kind is a branch point, whose curve has singular equations: stability_chart traces it")
     n = len(orbit.start)
+    # steps in scaled arc length, in which each side of the box has length 1 and the crank's length counts as 1
     settings = Settings(
-        low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, widest=widest, most_points=most_points
+        low=y[0], high=y[1], bounds={n: x}, first=2e-3, greatest=0.3, widest=4e-2, most_points=most_points
     )
     unknowns = np.append(orbit.scale, x[1] - x[0])
     follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)

@@ -43,12 +43,7 @@ _USED = PLAIN, VARIATIONAL, IN_LANES + VARIATIONAL, IN_LANES + GAP
 
 
 def largest_multipliers(
-    rows: Sequence[Parameters],
-    drives: Sequence[Drive],
-    guesses: ArrayLike | None = None,
-    *,
-    turns: int = 1,
-    tolerance: float = INTEGRATOR_TOLERANCE,
+    rows: Sequence[Parameters], drives: Sequence[Drive], guesses: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row.
 
@@ -61,10 +56,6 @@ def largest_multipliers(
         Parameters and drive of each mechanism.
     guesses : array_like, shape (n,) or (k, n), optional
         Guess of y for the first mechanism, and further guesses that are used if the first leads to no orbit; see `find_orbit`.
-    turns : int
-        Number of common periods in the period of the orbits.
-    tolerance : float
-        Bound of the integrator's local error.
 
     Returns
     -------
@@ -78,17 +69,17 @@ def largest_multipliers(
     points = [operating_point(parameters, drive) for parameters, drive in zip(rows, drives)]
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([first_guess(points[0].flow, drives[0], guess) for guess in given])
-    return _solve_row(point_row(points, starting[0]), starting, tolerance, turns)
+    return _solve_row(point_row(points, starting[0]), starting, INTEGRATOR_TOLERANCE)
 
 
 def _solve_row(
-    row: PointRow, guesses: FloatArray, tolerance: float, turns: int = 1
+    row: PointRow, guesses: FloatArray, tolerance: float
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Return the largest multipliers, the starts and the status of the orbits of a row: see `largest_multipliers`."""
     m, n = row.scales.shape
     section = row.first.section(guesses[0], *_USED, tolerance=tolerance, switched=row.switched)
     found = Row(np.full((m, n), np.nan), np.full((m, n * n), np.nan), np.zeros(m, dtype=np.int64))
-    kernels.solve_row(section, row.points(), row.search(turns), guesses, found)
+    kernels.solve_row(section, row.points(), row.search(1), guesses, found)
     values = np.full(m, np.nan)
     good = found.status == Status.DONE
     if good.any():

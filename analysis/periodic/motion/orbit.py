@@ -40,7 +40,7 @@ from .discretisation import (
     operating_point,
     orbit_error,
 )
-from .drive import Drive, mean_rates, spread_starts
+from .drive import Drive, mean_rates, spread_starts, start_ranges
 from .flow import PLAIN, STATE, TOLERANCE, VARIATIONAL, Flow, StabilityVerdict, liouville, multipliers, verdict
 from .kernels import Status
 from .variables import Family
@@ -492,8 +492,9 @@ def newton_orbit(
             return _solve_with_rounds(point, turns, settled)
         except OrbitError:
             pass
+    ranges = start_ranges(parameters, drive, guess)
     for number in range(SETS):
-        for place in spread_starts(parameters, drive, guess, STARTS, number):
+        for place in spread_starts(parameters, drive, guess, STARTS, number, ranges):
             found = approach_orbit(point, turns, place)
             if found is None:
                 continue

@@ -63,15 +63,11 @@ class Jump:
         First speed on the new motion (rad/s).
     amplitude_before, amplitude_after : float
         Amplitudes of the two motions (m, or rad for an angle).
-    turns_before, turns_after : int
-        Turns of the crank in a period of the two motions; a period doubling changes them, but hardly the amplitude.
     """
 
     speed: float
     amplitude_before: float
     amplitude_after: float
-    turns_before: int
-    turns_after: int
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -166,15 +162,7 @@ def sweep(
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
-                jumps.append(
-                    Jump(
-                        speed=speed,
-                        amplitude_before=last.amplitude,
-                        amplitude_after=orbit.amplitude,
-                        turns_before=last.crank_turns,
-                        turns_after=orbit.crank_turns,
-                    )
-                )
+                jumps.append(Jump(speed=speed, amplitude_before=last.amplitude, amplitude_after=orbit.amplitude))
         orbits.append(orbit)
         flags.append(flag)
         last = orbit
