@@ -288,10 +288,7 @@ class BlackBox:
             distance = np.hypot(*self._pins(q, rotation))
             spans.append((distance.min(axis=1), distance.max(axis=1), limits.way))
         for nearest, farthest, least in spans:
-            found += [
-                ("loop closure", farthest - (l3 + l4)),
-                ("loop closure", np.abs(l3 - l4) - nearest),
-            ]
+            found += [("loop closure", farthest - (l3 + l4)), ("loop closure", np.abs(l3 - l4) - nearest)]
             if least is not None:
                 # converted to lengths, so that no constraint outweighs another
                 both = Linkage.transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))

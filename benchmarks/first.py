@@ -38,10 +38,7 @@ IDLE = ("import analysis", "linkwork --version")
 WITHOUT = "from pathlib import Path; from analysis.numerics import codegen; codegen.CARRIED = Path('none'); "
 
 #: Commands on the file of a linkage, whose path is the last argument.
-FROM_A_FILE = {
-    "run": (COMMAND, "run"),
-    "native FMU": (COMMAND, "build", "--kinds", "native", "--dest", "."),
-}
+FROM_A_FILE = {"run": (COMMAND, "run"), "native FMU": (COMMAND, "build", "--kinds", "native", "--dest", ".")}
 LIBRARY = Path(__file__).parents[1] / "examples" / "linkages"
 #: The linkage that fills the cache for the others.
 BEFORE = "toggle-press"
@@ -102,12 +99,7 @@ def main() -> None:
         Console(width=180).print(linkages(sys.argv[2:] or list(MEASURED)))
         return
     table = Table(title="seconds by the clock, of the processor; compilations")
-    for heading in (
-        "",
-        *("no kernels", "s", "compiled"),
-        *("first", "s", "compiled"),
-        *("again", "s", "compiled"),
-    ):
+    for heading in ("", *("no kernels", "s", "compiled"), *("first", "s", "compiled"), *("again", "s", "compiled")):
         table.add_column(heading, justify="right" if heading else "left")
     for what, arguments in WAITS.items():
         with tempfile.TemporaryDirectory() as folder:

@@ -35,10 +35,7 @@ Kernel.unchecked = property(lambda kernel: kernel)
 
 #: Units of work that are sent to workers: patterns of the tests' names, and the name of the unit. A unit is a file, whose tests
 #: share results, or the test of one page of the documentation.
-UNITS = (
-    (r"(.*/test_docs\.py::test_the_page_.*)", r"\1"),
-    (r"(.*?)::.*", r"\1"),
-)
+UNITS = ((r"(.*/test_docs\.py::test_the_page_.*)", r"\1"), (r"(.*?)::.*", r"\1"))
 
 
 def unit(nodeid: str) -> str:

@@ -118,8 +118,7 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
 def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
     """Return a hypothesis strategy of the cases that ``draw`` makes."""
     return draw(
-        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
-        lambda: draw_from(st.booleans()),
+        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)), lambda: draw_from(st.booleans())
     )
 
 

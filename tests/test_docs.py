@@ -96,9 +96,7 @@ def test_every_erratum_has_its_test(name, last):
     assert [number for number, _ in rows] == [str(n + 1) for n in range(last)]
     for number, row in rows:
         assert name != "rahman.md" or re.search(
-            rf"\*\*({FAILS}|{IN_PART})\*\*.*\b(erratum|errata)[ \d,and]* {number}\b",
-            page,
-            re.MULTILINE | re.IGNORECASE,
+            rf"\*\*({FAILS}|{IN_PART})\*\*.*\b(erratum|errata)[ \d,and]* {number}\b", page, re.MULTILINE | re.IGNORECASE
         ), number
         tests = re.findall(r"`(tests/\S+\.py)::(\w+)(?:::(\w+))?`", row.split(" | ")[-1])
         assert tests, row

@@ -71,11 +71,7 @@ def kinds() -> dict[str, str]:
     return (
         runs
         | dict.fromkeys(_TASKS, "linkwork synthesize")
-        | {
-            SLIDER_MOTION: "linkwork slider-motion",
-            TUNING: "linkwork tune",
-            LINKAGE: "linkwork linkage",
-        }
+        | {SLIDER_MOTION: "linkwork slider-motion", TUNING: "linkwork tune", LINKAGE: "linkwork linkage"}
     )
 
 

@@ -97,11 +97,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
                     f"{dry.damping_ratio:.3g}, and the fit within {dry.residual:.2g}"
                 )
     stem = output_folder(out) / f"{Path(record).stem}-decrement"
-    columns = {
-        "time [s]": decay.time,
-        f"position [{unit}]": decay.position,
-        f"fit [{unit}]": decay.fitted,
-    }
+    columns = {"time [s]": decay.time, f"position [{unit}]": decay.position, f"fit [{unit}]": decay.fitted}
     written = [write_csv(f"{stem}.csv", columns)]
     if plot:
         drawn = figures.plot(decay, (t[kept], x[kept]), unit=unit, title=Path(record).name)

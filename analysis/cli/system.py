@@ -116,14 +116,7 @@ def build(file: str, fmi: str, out: str) -> None:
 @common.plot_option
 @common.report_errors
 def run(
-    file: str,
-    step: str | None,
-    stop: str | None,
-    coupling: str,
-    share: float | None,
-    fmi: str,
-    out: str,
-    plot: bool,
+    file: str, step: str | None, stop: str | None, coupling: str, share: float | None, fmi: str, out: str, plot: bool
 ) -> None:
     """Run a system, print its connected outputs and draw them.
 

@@ -50,10 +50,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
         _print(chosen.title, tuned)
     folder = common.output_folder(out)
     stem = folder / f"{Path(case).stem}-tuned"
-    written = [
-        write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)),
-        write_tables(f"{stem}.json", tables),
-    ]
+    written = [write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)), write_tables(f"{stem}.json", tables)]
     written += common.save_plot(plot, tuned, f"{stem}.png", title=chosen.title)
     if not as_json:
         common.print_paths(written)

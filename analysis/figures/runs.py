@@ -51,11 +51,7 @@ class _Rows:
 
 @plot.register
 def plot_outputs(
-    run: Trajectory,
-    names: Sequence[str] | None = None,
-    *,
-    columns: int = 1,
-    title: str = "",
+    run: Trajectory, names: Sequence[str] | None = None, *, columns: int = 1, title: str = ""
 ) -> style.Figure:
     """Plot a run: outputs over time, and the mechanism at the start with the paths of its points.
 

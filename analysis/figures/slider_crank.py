@@ -139,12 +139,7 @@ def _force_panel(
 
 @plot.register
 def plot_tolerances(
-    found: MonteCarlo,
-    quantity: str = "slider.position",
-    angle: float = 0.0,
-    *,
-    units: str = "SI",
-    title: str = "",
+    found: MonteCarlo, quantity: str = "slider.position", angle: float = 0.0, *, units: str = "SI", title: str = ""
 ) -> Figure:
     """Plot the errors that tolerances cause over the turn; at one crank angle, plot the samples and each tolerance's share.
 

@@ -397,9 +397,7 @@ def plot_sheet(
         right = ["task", "transmission", *(["forces"] if forces is not None else [])]
         rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
         panels = figure.subplot_mosaic(
-            rows,
-            width_ratios=(1.2, 1.0),
-            height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5),
+            rows, width_ratios=(1.2, 1.0), height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5)
         )
         _draw_panel(panels["linkage"], scene, size=2.0)
         _plot_task(panels["task"], scene)

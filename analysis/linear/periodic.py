@@ -345,12 +345,7 @@ def common_period(mechanism: Mechanism, speeds: Mapping[int, float]) -> float:
 
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
 def settled_motion(
-    parameters: Parameters,
-    inputs: Inputs,
-    *,
-    initial: InitialState | None = None,
-    samples: int = 128,
-    turns: int = 200,
+    parameters: Parameters, inputs: Inputs, *, initial: InitialState | None = None, samples: int = 128, turns: int = 200
 ) -> FloatArray:
     """Run a mechanism at constant speed for many turns; return the states of the last turn, after which the motion repeats.
 

@@ -348,10 +348,7 @@ class Motion:
         rows += [f"a = applied_forces(b, m, {s}i, p)", f"f = generalised_forces(m, a.wrenches, {self.n})"]
         right = [f"f[{k}] + a.along[{k}] + i.{drives[k].name}_load" for k in n]
         rows += [f"right = ({', '.join(right)},)", f"matrix = mass_matrix(m, {self.n})"]
-        rows += [
-            f"held_ones = {held}",
-            f"e = accelerations(matrix, right, held_ones, {known})",
-        ]
+        rows += [f"held_ones = {held}", f"e = accelerations(matrix, right, held_ones, {known})"]
         wrenches, lost = "a.wrenches", "a.lost"
         if self.description.friction:
             # 0.1 N/kg is a hundredth of the weight: 0.01 N would be more than all forces of a microscopic linkage

@@ -392,14 +392,7 @@ class Chart:
         return scan(lambda x: self.test(x, y), *self.box.x, samples=samples)
 
 
-def chart(
-    test: Test,
-    box: Box,
-    *,
-    lines: tuple[int, int] = (2, 5),
-    samples: int = 200,
-    step: float = 0.02,
-) -> Chart:
+def chart(test: Test, box: Box, *, lines: tuple[int, int] = (2, 5), samples: int = 200, step: float = 0.02) -> Chart:
     """Find and trace the boundaries in a box.
 
     Parameters

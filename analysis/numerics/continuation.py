@@ -309,11 +309,7 @@ class Follower:
         return None if isinstance(found, _Failure) else self._point(found, point.tangent)
 
     def follow(
-        self,
-        first: Point,
-        *,
-        watch: Callable[[Point], None] | None = None,
-        leave: Callable[[Point], str] | None = None,
+        self, first: Point, *, watch: Callable[[Point], None] | None = None, leave: Callable[[Point], str] | None = None
     ) -> Curve:
         """Follow the curve until it reaches an end of the range, comes back to its first point or cannot be continued.
 
@@ -361,10 +357,7 @@ class Follower:
             widths = np.abs(point.tangent[[*settings.bounds, -1]])
             length = min(length, max(settings.widest / max(float(widths.max()), settings.least), settings.least))
         return Curve(
-            tuple(points),
-            tuple(steps),
-            Reason.LENGTH,
-            f"it is followed over {settings.most_points} points only",
+            tuple(points), tuple(steps), Reason.LENGTH, f"it is followed over {settings.most_points} points only"
         )
 
     def follow_both(

@@ -74,10 +74,7 @@ def _matmul(a: Dual, b: Dual) -> Dual:
 
 
 def _atan2(y: Dual, x: Dual) -> Dual:
-    return Dual(
-        np.arctan2(y.real, x.real),
-        (x.real * y.dual - y.real * x.dual) / (x.real * x.real + y.real * y.real),
-    )
+    return Dual(np.arctan2(y.real, x.real), (x.real * y.dual - y.real * x.dual) / (x.real * x.real + y.real * y.real))
 
 
 def _hypot(a: Dual, b: Dual) -> Dual:
@@ -309,7 +306,4 @@ def _skew(a: Array) -> Array:
 
 
 def _axial(m: Array) -> Array:
-    return 0.5 * np.stack(
-        [m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]],
-        -1,
-    )
+    return 0.5 * np.stack([m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], -1)

@@ -191,9 +191,7 @@ def run_in_parallel(
                         f"parts are not done, {numbers}{' ...' if len(todo) > 5 else ''}"
                     ) from error
                 warnings.warn(
-                    f"a worker was killed: {len(todo)} of {len(items)} parts are repeated",
-                    RuntimeWarning,
-                    stacklevel=2,
+                    f"a worker was killed: {len(todo)} of {len(items)} parts are repeated", RuntimeWarning, stacklevel=2
                 )
             except Exception as error:  # from any backend
                 raise WorkersLost(f"the workers failed: {type(error).__name__}: {error}") from error

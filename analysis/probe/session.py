@@ -34,12 +34,7 @@ class ProbeError(LinkworkError):
 _LOGGER = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_void_p
 )
-_CLASSES = {
-    (2, "cs"): fmi2.FMU2Slave,
-    (2, "me"): fmi2.FMU2Model,
-    (3, "cs"): fmi3.FMU3Slave,
-    (3, "me"): fmi3.FMU3Model,
-}
+_CLASSES = {(2, "cs"): fmi2.FMU2Slave, (2, "me"): fmi2.FMU2Model, (3, "cs"): fmi3.FMU3Slave, (3, "me"): fmi3.FMU3Model}
 
 
 class Library:

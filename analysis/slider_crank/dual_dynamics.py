@@ -60,10 +60,7 @@ class Binor:
     def momentum(self, velocity: Dual) -> Dual:
         """Return p + eps H for omega + eps v, shape (..., 3): p = m v + omega x m c, H = I omega + m c x v."""
         omega, v = velocity.real, velocity.dual
-        return Dual(
-            self.mass * v + np.cross(omega, self.moment),
-            omega @ self.inertia.T + np.cross(self.moment, v),
-        )
+        return Dual(self.mass * v + np.cross(omega, self.moment), omega @ self.inertia.T + np.cross(self.moment, v))
 
     def rate(self, velocity: Dual, acceleration: Dual) -> Dual:
         """Return the rate of the dual momentum (eqs 49 to 58); ``acceleration`` is the rate of the velocity's components."""
@@ -137,12 +134,7 @@ class JointLoads:
 
 
 def rates(
-    closure: Closure,
-    *,
-    speed: Any,
-    shift_velocity: Any = 0.0,
-    acceleration: Any = 0.0,
-    shift_acceleration: Any = 0.0,
+    closure: Closure, *, speed: Any, shift_velocity: Any = 0.0, acceleration: Any = 0.0, shift_acceleration: Any = 0.0
 ) -> Rates:
     """Compute dual velocities (eqs 29 to 45) and their time derivatives from the motion of crank and shift.
 

@@ -153,10 +153,7 @@ def sensitivities(
         values[name] = masked_array(np.broadcast_to(x.real, (n,)), dead)
         derivatives[name] = masked_array(np.broadcast_to(x.dual, (m, n)), dead)
     return Sensitivities(
-        turn=turn,
-        names=tuple(errors),
-        values=MappingProxyType(values),
-        derivatives=MappingProxyType(derivatives),
+        turn=turn, names=tuple(errors), values=MappingProxyType(values), derivatives=MappingProxyType(derivatives)
     )
 
 

@@ -145,13 +145,7 @@ def convergence(
                     messages[f"{way}, {step:g} s"] = run.message
                     continue
                 errors[way][number], powers[way][number] = _error(run, right, names), run.added_work()
-    return Convergence(
-        title=system.title,
-        steps=np.array(steps),
-        errors=errors,
-        powers=powers,
-        messages=messages,
-    )
+    return Convergence(title=system.title, steps=np.array(steps), errors=errors, powers=powers, messages=messages)
 
 
 def _error(run: SystemRun, right: SystemRun, names: Sequence[str]) -> float:

@@ -313,18 +313,12 @@ def approximations(response: Response, points: int = 160) -> Approximations:
     load = constant_load(response.family.drive)
     speeds = np.linspace(response.low, response.high, points)
     return Approximations(
-        parameters=parameters,
-        load=load,
-        speed=speeds,
-        amplitudes=_approximate(parameters, speeds, load),
+        parameters=parameters, load=load, speed=speeds, amplitudes=_approximate(parameters, speeds, load)
     )
 
 
 #: Approximations by name: variant of the linear equation and harmonics balanced.
-_APPROXIMATIONS = {
-    "two harmonics": (Variant.SECOND_ORDER, 2),
-    "ten harmonics": (Variant.EXACT, 10),
-}
+_APPROXIMATIONS = {"two harmonics": (Variant.SECOND_ORDER, 2), "ten harmonics": (Variant.EXACT, 10)}
 
 
 def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) -> dict[str, NDArray[np.float64]]:
@@ -359,11 +353,7 @@ def _basis(order: int) -> _Basis:
     weight = np.full(2 * order + 1, 2.0 / samples)
     weight[0] = 1.0 / samples
     return _Basis(
-        angle,
-        value,
-        np.hstack([-k * np.sin(phase), k[1:] * cos[:, 1:]]),
-        -value * square,
-        weight[:, None] * value.T,
+        angle, value, np.hstack([-k * np.sin(phase), k[1:] * cos[:, 1:]]), -value * square, weight[:, None] * value.T
     )
 
 

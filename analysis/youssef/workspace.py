@@ -250,11 +250,7 @@ def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y
 @takes_published()
 @in_si(slider_range="m")
 def accessible_area(
-    parameters: FiveBarParameters,
-    slider_range: Amount,
-    *,
-    tolerance: float = 1e-4,
-    finest: int = FINEST,
+    parameters: FiveBarParameters, slider_range: Amount, *, tolerance: float = 1e-4, finest: int = FINEST
 ) -> AccessibleArea:
     """Return the area that the coupler point P reaches as crank and slider move independently.
 

@@ -221,10 +221,7 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
             'published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"\ntorque = 1\nangle = 2',
             r"drive\.torque\.angle",
         ),
-        (
-            'published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1',
-            "drive .*only one of torque, speed",
-        ),
+        ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "drive .*only one of torque, speed"),
         ('published = "table-3.1"\n[run]\nrevolutions = 0', r"run\.revolutions is 0: it must be greater than zero"),
         (
             'published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"',

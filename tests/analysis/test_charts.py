@@ -167,12 +167,7 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     branch = follow(family, orbit, 0.2, low=0.15, high=0.45)
     expected = {special.kind: special.parameter for special in branch.special}
     chart = stability_chart(
-        TABLE_3_1,
-        drive,
-        ("drive.torque", "slider.damping"),
-        ((0.2, 0.45), (29.0, 31.0)),
-        points=12,
-        start=orbit.start,
+        TABLE_3_1, drive, ("drive.torque", "slider.damping"), ((0.2, 0.45), (29.0, 31.0)), points=12, start=orbit.start
     )
     for kind in (Crossing.TORUS, Crossing.PERIOD_DOUBLING):
         (boundary,) = [traced for traced in chart.boundaries if traced.kind is kind]

@@ -248,10 +248,7 @@ def test_file_endings(tmp_path: Path) -> None:
         (lambda: Polyline(layer="target", points=np.zeros((4, 3))), r"\(n, 2\)"),
         (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5,)), "bulges"),
         (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5, 1.5)), "-1 to 1"),
-        (
-            lambda: Dimension(layer="dimension", start=(0.0, 0.0), end=(0.0, 0.0), offset=0.1, height=0.1),
-            "apart",
-        ),
+        (lambda: Dimension(layer="dimension", start=(0.0, 0.0), end=(0.0, 0.0), offset=0.1, height=0.1), "apart"),
         (lambda: Polyline(layer="target", points=np.array([[0, 0], [np.inf, 0]])), "finite"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=-1.0, text="a"), "height=-1.0"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text="a\nb"), "one line"),

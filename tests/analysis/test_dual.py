@@ -177,10 +177,7 @@ def test_directions_are_no_axis_of_the_numbers(size: int) -> None:
         found = operation(x, y)
         assert found.shape == (size,)
         assert found.dual.shape == (2, size)
-        slopes = [
-            operation(2.1 + h, 3.2) - operation(2.1 - h, 3.2),
-            operation(2.1, 3.2 + h) - operation(2.1, 3.2 - h),
-        ]
+        slopes = [operation(2.1 + h, 3.2) - operation(2.1 - h, 3.2), operation(2.1, 3.2 + h) - operation(2.1, 3.2 - h)]
         np.testing.assert_allclose(found.dual, np.array(slopes) / (2.0 * h), rtol=1e-7, atol=1e-8)
 
 

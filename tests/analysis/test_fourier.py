@@ -44,8 +44,7 @@ def test_amplitudes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cos", "sin", "message"),
-    [([1.0, 2.0], [0.0], "shape"), ([np.nan], [0.0], "not finite"), ([], [], "shape")],
+    ("cos", "sin", "message"), [([1.0, 2.0], [0.0], "shape"), ([np.nan], [0.0], "not finite"), ([], [], "shape")]
 )
 def test_bad_coefficients_are_refused(cos: list[float], sin: list[float], message: str) -> None:
     with pytest.raises(InputError, match=message):

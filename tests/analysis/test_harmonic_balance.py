@@ -126,12 +126,7 @@ class TestNonlinear:
 
     @pytest.mark.parametrize(
         ("parameters", "rpm"),
-        [
-            (TABLE_3_1, 420.0),
-            (RIG_1_A, 300.0),
-            (RIG_1_A, 450.0),
-            (RIG_1_B, 560.0),
-        ],
+        [(TABLE_3_1, 420.0), (RIG_1_A, 300.0), (RIG_1_A, 450.0), (RIG_1_B, 560.0)],
         ids=["table-3.1", "rig-1-a-300", "rig-1-a-450", "rig-1-b-560"],
     )
     def test_it_is_what_a_long_run_ends_in(self, parameters: FiveBarParameters, rpm: float) -> None:

@@ -95,10 +95,7 @@ def residual(q: Any, qd: Any, qdd: Any, i: Any, p: Any) -> tuple[complex, comple
     m = f.inertia(g, k, p)
     b1, b2 = f.velocity_terms(g, k, qd[0], w3, w4, *f.centripetal(g, qd[0], w3, w4, p), p)
     q1, q2 = f.applied_forces(g, k, q[1], qd[1], i.load_x, i.load_y, p)
-    return (
-        m.m11 * qdd[0] + m.m12 * qdd[1] + b1 - q1 - i.torque,
-        m.m12 * qdd[0] + m.m22 * qdd[1] + b2 - q2 - i.force,
-    )
+    return (m.m11 * qdd[0] + m.m12 * qdd[1] + b1 - q1 - i.torque, m.m12 * qdd[0] + m.m22 * qdd[1] + b2 - q2 - i.force)
 
 
 def assert_near(actual: np.ndarray, exact: np.ndarray, tolerance: float = 1e-10) -> None:

@@ -114,9 +114,7 @@ def driven(request: pytest.FixtureRequest) -> tuple[PeriodicOrbit, Callable[[Any
     return orbit, turned
 
 
-def test_orbits_and_multipliers_under_a_torque_are_scipys(
-    driven: tuple[PeriodicOrbit, Callable[[Any], Any]],
-) -> None:
+def test_orbits_and_multipliers_under_a_torque_are_scipys(driven: tuple[PeriodicOrbit, Callable[[Any], Any]]) -> None:
     orbit, turned = driven
     shot = root(lambda y: turned(y) - y, orbit.start * 1.001, tol=1e-11)
     assert shot.x == pytest.approx(orbit.start, rel=1e-8, abs=1e-10)

@@ -140,10 +140,7 @@ def test_two_unstable_branches_on_one_another_are_drawn_once() -> None:
 
 def test_tuning_leads_the_second_resonance_out_of_the_range(shaker: Case) -> None:
     wish = Wish(
-        parameters=shaker.parameters,
-        change={"up.stiffness": "40 %"},
-        speeds=("440 rpm", "520 rpm"),
-        no_resonance=True,
+        parameters=shaker.parameters, change={"up.stiffness": "40 %"}, speeds=("440 rpm", "520 rpm"), no_resonance=True
     )
     tuned = tune(wish)
     assert tuned.met

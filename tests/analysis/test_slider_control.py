@@ -196,8 +196,7 @@ def test_a_crank_that_no_slider_force_holds_is_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("damping", "bandwidth", "reason"),
-    [(30.0, 35.0, "design_pid"), (5.5, 6.0, "closed loop is not stable")],
+    ("damping", "bandwidth", "reason"), [(30.0, 35.0, "design_pid"), (5.5, 6.0, "closed loop is not stable")]
 )
 def test_a_pi_near_a_light_resonance_is_refused(damping, bandwidth, reason) -> None:
     p = replace(SETS["rig-2-spring-c"].parameters, slider_damping=damping)

@@ -156,11 +156,7 @@ class TestMechanism:
     @pytest.mark.parametrize(
         ("arguments", "error", "words"),
         [
-            (
-                (SHORT, 0.0, 0.0),
-                AssemblyError,
-                r"1\.0668 m .* 0\.9 m .* 0\.1668 m",
-            ),
+            ((SHORT, 0.0, 0.0), AssemblyError, r"1\.0668 m .* 0\.9 m .* 0\.1668 m"),
             ((OFFSET, 0.0, 1.5), AssemblyError, "m too short"),
             ((OFFSET, np.nan, 0.0), InputError, "crank angle is nan"),
             ((OFFSET, 0.0, np.inf), InputError, "shift is inf"),

@@ -228,11 +228,7 @@ def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
     [
         ({"inputs": Inputs(load_x=1.0)}, InputError, "a slider-crank has no input 'load_x': its inputs are torque"),
         ({"initial": FiveBarState()}, InputError, "initial is linkwork.five_bar.*must be linkwork.slider_crank"),
-        (
-            {"initial": InitialState(shift_position=1.2)},
-            AssemblyError,
-            r"crank pin is .* m from the guide",
-        ),
+        ({"initial": InitialState(shift_position=1.2)}, AssemblyError, r"crank pin is .* m from the guide"),
         ({"tolerance": 1.0}, ParameterError, "solver.tolerance"),
         (
             {"inputs": Inputs(load=Function(lambda t, th, s, w, v: float("nan")))},

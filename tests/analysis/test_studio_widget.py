@@ -30,9 +30,7 @@ CASE = Case(
 
 
 @pytest.mark.parametrize(
-    ("what", "state"),
-    [(None, opening_state()), (CASE, page_state(CASE))],
-    ids=["nothing", "case"],
+    ("what", "state"), [(None, opening_state()), (CASE, page_state(CASE))], ids=["nothing", "case"]
 )
 def test_a_widget_shows_what_it_is_made_of(what: Any, state: dict[str, Any]) -> None:
     widget = Widget(what, height=500)

@@ -60,12 +60,7 @@ SPRUNG = replace(rahman.parameters(20.0, 232.0), shift_stiffness=8000.0, shift_d
 TONGUE = torsion.Parameters(
     rotor_stiffness=1.0, rotor_damping=0.05, rotor_cubic_stiffness=0.2, rotor_modulation=0.8, rotor_excitation=0.02
 )
-OF_TONGUE = {
-    "parameters": TONGUE,
-    "change": {"rotor.damping": [0.01, 0.6]},
-    "no_jump": True,
-    "least": "rotor.damping",
-}
+OF_TONGUE = {"parameters": TONGUE, "change": {"rotor.damping": [0.01, 0.6]}, "no_jump": True, "least": "rotor.damping"}
 
 
 def wish(**of):

@@ -243,11 +243,7 @@ def test_the_response_scales_all_commanded_speeds_together(ratio: Fraction) -> N
 
 def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
     chart = stability_chart(
-        P,
-        _drive(20.0, Fraction(3, 2)),
-        ("left.speed", "cart.damping"),
-        ranges=((18.0, 30.0), (5.0, 20.0)),
-        points=5,
+        P, _drive(20.0, Fraction(3, 2)), ("left.speed", "cart.damping"), ranges=((18.0, 30.0), (5.0, 20.0)), points=5
     )
     for row, damping in enumerate(chart.grid.y):
         for column, speed in enumerate(chart.grid.x):

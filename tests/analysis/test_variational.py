@@ -164,12 +164,7 @@ def optimum(linkage: Linkage, phi: FloatArray, target: FloatArray, **settings: o
 
 
 def path_settings(settings: dict[str, object], branch: float) -> tuple[float, tuple[float, float], float, float]:
-    return (
-        settings["guide_angle"],
-        settings["stroke"],
-        settings["least_transmission"],
-        branch,
-    )
+    return (settings["guide_angle"], settings["stroke"], settings["least_transmission"], branch)
 
 
 class TestBruteForce:

@@ -103,10 +103,7 @@ def changes_of(folder: str, text: str, other: str) -> dict[str, tuple[Changes, b
     return {
         "nothing": ({}, True),
         "constant": ({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")}, True),
-        "docstring": (
-            {f"linkwork/{folder}/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
-            True,
-        ),
+        "docstring": ({f"linkwork/{folder}/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')}, True),
         "description": ({variables: (text, other)}, True),
         "name": ({shared: (residual, '"closure.gap", "m"')}, False),
         "unit": ({shared: (residual, '"closure.residual", "1"')}, False),

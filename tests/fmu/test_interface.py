@@ -25,10 +25,7 @@ from .described import read_scalars, read_unknowns
 EVERY = {m.name: m for m in (FIVE_BAR, SLIDER_CRANK, pendulum.MECHANISM, rotor_on_cart.MECHANISM)}
 
 #: Name, causality, unit, and what it is the derivative of.
-POWERS = [
-    ("power.dissipated", "local", "W", "energy.dissipated"),
-    ("power.supplied", "local", "W", "energy.supplied"),
-]
+POWERS = [("power.dissipated", "local", "W", "energy.dissipated"), ("power.supplied", "local", "W", "energy.supplied")]
 ENERGIES = [("energy.dissipated", "local", "J", None), ("energy.supplied", "local", "J", None)]
 TIME = [("time", "independent", "s", None)]
 MARGIN = [("assembly.margin_to_limit", "local", "1", None)]

@@ -386,10 +386,7 @@ def test_interfaces_that_there_are_not(library: Library) -> None:
         assert dll.fmi2Instantiate(b"x", 7, token, None, byref(Callbacks()), 0, 0) is None
         assert dll.fmi2Instantiate(b"x", 1, token, None, None, 0, 0) is None  # no callbacks
         return
-    for refused, sentence in (
-        (library.instance(event_mode=True), "no event mode"),
-        (None, "no scheduled execution"),
-    ):
+    for refused, sentence in ((library.instance(event_mode=True), "no event mode"), (None, "no scheduled execution")):
         if refused is not None:
             assert refused.handle is None
             assert sentence in refused.log[0][1]

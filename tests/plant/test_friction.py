@@ -145,11 +145,7 @@ def started(par: FiveBarParameters) -> Plant:
 
 
 def test_energy_account_of_a_run() -> None:
-    par = replace(
-        SETS["rig-1-spring-a"].parameters,
-        slider_friction_coefficient=0.2,
-        **dict.fromkeys(PINS, 5e-4),
-    )
+    par = replace(SETS["rig-1-spring-a"].parameters, slider_friction_coefficient=0.2, **dict.fromkeys(PINS, 5e-4))
     ends = []
     for one in (par, replace(par, **dict.fromkeys(FRICTION, 0.0))):
         plant = started(one)

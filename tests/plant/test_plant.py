@@ -647,11 +647,7 @@ def test_start_with_inputs_that_are_not_usable(kind: Kind, name: str) -> None:
                 ),
                 ("speed-shift", {"inputs": {"drive.speed": 1e300}}, r"drive\.speed is 1e\+300 rad/s"),
                 ("speed-shift", {"inputs": {"axial.speed": 1e300}}, r"axial\.speed is 1e\+300 m/s"),
-                (
-                    "speed-groove",
-                    {"inputs": {"drive.speed": 1e300}},
-                    r"drive\.speed is 1e\+300 rad/s",
-                ),
+                ("speed-groove", {"inputs": {"drive.speed": 1e300}}, r"drive\.speed is 1e\+300 rad/s"),
             ]
         ),
     ],

@@ -50,11 +50,7 @@ def assert_agrees_with_bodies(case: Case, drive: str) -> None:
     s = solve_bodies(case, drive)
     motion, f = e.motion, e.forces
     tolerance = 1e-9
-    accelerations = [
-        *s["crank_acceleration"] * p.a1,
-        *s["shift_acceleration"],
-        *s["slider_acceleration"],
-    ]
+    accelerations = [*s["crank_acceleration"] * p.a1, *s["shift_acceleration"], *s["slider_acceleration"]]
     found = [motion.crank_acceleration * p.a1, motion.shift_acceleration, motion.slider_acceleration]
     size = max(map(abs, accelerations)) + (abs(x[2]) * p.a1 + abs(x[3])) ** 2 / p.a1
     assert found == pytest.approx(accelerations, rel=0.0, abs=tolerance * size)

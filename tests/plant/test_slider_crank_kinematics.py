@@ -101,10 +101,7 @@ def test_velocities_and_accelerations_are_the_derivatives_along_a_motion(seed: i
     found = velocities(0.0)
     moved = derivative(lambda t: (at(t)[0].s4, *K.crank_pin(at(t)[0], at(t)[2], p)), step)
     assert found == pytest.approx(moved, abs=1e-8 * max(map(abs, found)))
-    accelerations = (
-        k.kth * e + k.ks * a + K.centripetal(q, k, w, v, p),
-        *K.crank_pin_acceleration(q, w, e, a, p),
-    )
+    accelerations = (k.kth * e + k.ks * a + K.centripetal(q, k, w, v, p), *K.crank_pin_acceleration(q, w, e, a, p))
     assert accelerations == pytest.approx(derivative(velocities, step), abs=1e-8 * max(map(abs, accelerations)))
 
 

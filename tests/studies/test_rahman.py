@@ -72,8 +72,7 @@ SHOWN = (
 
 
 @pytest.mark.parametrize(
-    ("erratum", "study", "beginning", "label", "size"),
-    [pytest.param(*row, marks=marks_of(row[1])) for row in SHOWN],
+    ("erratum", "study", "beginning", "label", "size"), [pytest.param(*row, marks=marks_of(row[1])) for row in SHOWN]
 )
 def test_what_fails_by_an_erratum(erratum: str, study: str, beginning: str, label: str, size: float) -> None:
     found = statement(study, beginning)

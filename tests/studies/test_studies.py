@@ -155,10 +155,7 @@ class TestStatements:
     def test_bars_do_not_break_the_page(self) -> None:
         """A single case stands in the line of the verdict, several in a table."""
         one = Statement("|x| is 2.", self.PLACE, "|x|", "", (at_most("", "2", 3.0, why="|x| grows"),))
-        assert list(block(one))[-2:] == [
-            "**Does not hold**: stated 2; allowed at most 2; computed 3; |x| grows.",
-            "",
-        ]
+        assert list(block(one))[-2:] == ["**Does not hold**: stated 2; allowed at most 2; computed 3; |x| grows.", ""]
         two = Statement("|x| is 2.", self.PLACE, "|x|", "", (self.SHORT, near("|x|", "1", 1.0)))
         assert list(block(two))[-2] == r"| \|x\| | 1 | 0.5 to 1.5 | 1 | holds |"
 

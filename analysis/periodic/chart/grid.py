@@ -359,13 +359,7 @@ def row_code(*functions: Any) -> tuple[str, ...]:
     return *map(fingerprint, functions), *sources
 
 
-def row_name(
-    row: PointRow,
-    guesses: FloatArray,
-    functions: Sequence[int],
-    code: Sequence[str],
-    *numbers: float,
-) -> str:
+def row_name(row: PointRow, guesses: FloatArray, functions: Sequence[int], code: Sequence[str], *numbers: float) -> str:
     """Return the name of a row in the cache: a hash of all that the row depends on.
 
     Parameters

@@ -448,12 +448,7 @@ def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
 
 @takes_published()
 def newton_orbit(
-    parameters: Parameters,
-    drive: Drive,
-    *,
-    turns: int = 1,
-    start: ArrayLike | None = None,
-    settle: bool = True,
+    parameters: Parameters, drive: Drive, *, turns: int = 1, start: ArrayLike | None = None, settle: bool = True
 ) -> PeriodicOrbit:
     """Find the periodic motion to which Newton's method leads from a guess.
 

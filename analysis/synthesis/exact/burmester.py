@@ -250,9 +250,7 @@ def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
     """Return the coefficients of (1, zx, zy, mx, my, wx, wy) in the conditions of all poses but the first, shape (n - 1, 7)."""
     p, e = p[1:] - p[0], np.exp(1j * (angle[1:] - angle[0]))
     seen = np.conj(p) * e
-    return np.column_stack(
-        [0.5 * np.abs(p) ** 2, seen.real, -seen.imag, -p.real, -p.imag, -(e.real - 1.0), e.imag],
-    )
+    return np.column_stack([0.5 * np.abs(p) ** 2, seen.real, -seen.imag, -p.real, -p.imag, -(e.real - 1.0), e.imag])
 
 
 def _forms() -> tuple[FloatArray, FloatArray]:
@@ -338,10 +336,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
     off = np.abs(np.column_stack([z, m]).imag).max(axis=1)
     real, far = real_dyads(z, m)
     dyads = tuple(
-        Dyad(
-            pivot=p[0] + unit * complex(mx.real, my.real),
-            point=p[0] + unit * complex(zx.real, zy.real),
-        )
+        Dyad(pivot=p[0] + unit * complex(mx.real, my.real), point=p[0] + unit * complex(zx.real, zy.real))
         for (zx, zy), (mx, my) in zip(z[real], m[real])
     )
     # two dyads with the same pivot, or the same point of the body, guide it no better than one

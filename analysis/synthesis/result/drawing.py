@@ -323,10 +323,7 @@ def _plate_holes(solution: Solution) -> dict[str, dict[str, complex]]:
     coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
     if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
         coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
-    made: dict[str, dict[str, complex]] = {
-        "crank": {"A": 0j, "B": complex(linkage.crank_length)},
-        "coupler": coupler,
-    }
+    made: dict[str, dict[str, complex]] = {"crank": {"A": 0j, "B": complex(linkage.crank_length)}, "coupler": coupler}
     if not isinstance(linkage, SliderCrank):
         made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
     if linkage.slider(0.0) is None:
