@@ -61,13 +61,17 @@ def _named_entries(reader: Any) -> Any:
 
 
 _PLACE = Many(coordinate, length=2)
-#: A direction of several turns is probably a number in degrees.
-_DIRECTION = Quantity(
-    "rad",
-    above=-8.0 * pi,
-    below=8.0 * pi,
-    requirement='be less than four turns; a number is in rad: for degrees write "90 deg"',
-)
+
+
+def angle(value: Any, name: str) -> float:
+    """Read an angle (rad); raise ParameterError for a number of four turns or more, which is probably in degrees."""
+    number = Quantity("rad")(value, name)
+    if not isinstance(value, str) and abs(number) >= 8.0 * pi:
+        requirement = (
+            f'be less than four turns, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
+        )
+        raise ParameterError(name, value, requirement)
+    return number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +125,7 @@ class Line:
 
     on: str = entry(_name)
     through: str = entry(_name)
-    direction: float = entry(_DIRECTION, 0.0)
+    direction: float = entry(angle, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +171,7 @@ class Gear:
 
     bodies: tuple[str, str] = entry(Many(_name, length=2))
     ratio: float = entry(Quantity("1"))
-    phase: float = entry(Quantity("rad"), 0.0)
+    phase: float = entry(angle, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -328,4 +332,4 @@ class Description:
     loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)
-    gravity_direction: float = entry(_DIRECTION, -0.5 * pi)
+    gravity_direction: float = entry(angle, -0.5 * pi)

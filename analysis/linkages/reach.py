@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, pi
 from typing import NamedTuple
 
@@ -54,8 +55,9 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     freedom : int
         Index of the degree of freedom.
     most : float, optional
-        Greatest distance from the start that is searched: by default half the period of the coordinate. If the coordinate is
-        not periodic, the default is four turns for an angle, and five times the length of the linkage for a displacement.
+        Greatest distance from the start that is searched, for an angle that has a limit on one side alone twice as far on the
+        other: by default half the period of the coordinate. If the coordinate is not periodic, the default is four turns for an
+        angle, and five times the length of the linkage for a displacement.
     samples : int
         Number of positions tried on each side of the start: per half turn if the coordinate is an angle, in total if it is a
         displacement.
@@ -78,34 +80,47 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         except (ArithmeticError, ValueError):
             return -1.0 - LIMIT_SINE
 
-    ends, free, least = [], [], margin(middle)
-    for sign in (-1.0, 1.0):
-        # one position more at each end, so that a minimum in the first or the last interval is found
-        places = (middle + sign * most * np.arange(-1, samples + 2) / samples).tolist()
-        values = [margin(places[0]), least]
-        for n, q in enumerate(places[2:], 2):
-            values.append(margin(q))
-            lowest, at = (values[n], q) if n <= samples + 1 else (inf, q)
-            if values[n - 2] > values[n - 1] <= values[n]:
-                # a limit may lie between two positions, where the sine of a transmission angle goes through zero
-                bounds = sorted((places[n - 2], q))
-                dip = scipy.optimize.minimize_scalar(
-                    margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most}
-                )
-                if dip.fun < min(values[n - 1], lowest) and 0.0 <= sign * (dip.x - middle) <= most:
-                    lowest, at = float(dip.fun), float(dip.x)
-            if lowest < 0.0:
-                before = places[max(n - 2, 1)]
-                ends.append(float(scipy.optimize.brentq(lambda c: max(margin(c), -1.0), before, at, xtol=1e-9 * most)))
-                free.append(False)
-                least = 0.0
-                break
-            least = min(least, lowest)
-        else:
-            free.append(True)
-            ends.append(places[samples + 1])
+    low, high = (_seek_limit(margin, middle, sign * most, samples) for sign in (-1.0, 1.0))
+    if unit == "rad" and low.open != high.open:
+        # an angle that cannot turn has both its limits within a turn
+        low, high = (
+            _seek_limit(margin, middle, 2.0 * sign * most, 2 * samples) if one.open else one
+            for sign, one in ((-1.0, low), (1.0, high))
+        )
+    ends, free, least = (low.at, high.at), (low.open, high.open), min(low.least, high.least)
     whole = ends[1] - ends[0] > period * (1.0 - 1e-9) if period else unit == "rad" and all(free)
-    return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least + LIMIT_SINE)
+    return Reach(freedom, unit, *ends, free, whole, least + LIMIT_SINE)
+
+
+class _End(NamedTuple):
+    """One end of a range: coordinate, whether the linkage can move on, least margin on the way."""
+
+    at: float
+    open: bool
+    least: float
+
+
+def _seek_limit(margin: Callable[[float], float], middle: float, most: float, samples: int) -> _End:
+    """Find the limit of assembly nearest to ``middle`` on the way to ``middle + most``; ``margin`` is zero there."""
+    # one position more at each end, so that a minimum in the first or the last interval is found
+    places = (middle + most * np.arange(-1, samples + 2) / samples).tolist()
+    least = margin(middle)
+    values, near = [margin(places[0]), least], 1e-9 * abs(most)
+    for n, q in enumerate(places[2:], 2):
+        values.append(margin(q))
+        lowest, at = (values[n], q) if n <= samples + 1 else (inf, q)
+        if values[n - 2] > values[n - 1] <= values[n]:
+            # a limit may lie between two positions, where the sine of a transmission angle goes through zero
+            bounds = sorted((places[n - 2], q))
+            dip = scipy.optimize.minimize_scalar(margin, bounds=bounds, method="bounded", options={"xatol": near})
+            if dip.fun < min(values[n - 1], lowest) and 0.0 <= (dip.x - middle) / most <= 1.0:
+                lowest, at = float(dip.fun), float(dip.x)
+        if lowest < 0.0:
+            before = places[max(n - 2, 1)]
+            end = scipy.optimize.brentq(lambda c: max(margin(c), -1.0), before, at, xtol=near)
+            return _End(float(end), False, 0.0)
+        least = min(least, lowest)
+    return _End(places[samples + 1], True, least)
 
 
 class DeadCentre(NamedTuple):

@@ -581,6 +581,15 @@ def test_ranges_of_motion():
     assert found.open == (False, False)
     # there the bodies of the dyad are in line
     assert found.least == pytest.approx(LIMIT_SINE)
+    # a limit more than half a turn from the start: the crank stops on either side where coupler and rocker are in line
+    swing = linkage("wide-swing", ground={"A": (0, 0), "D": ("100 mm", 0)}).body(
+        "crank", bar=("A", "B"), length="80 mm", mass=1.0
+    )
+    swing.body("coupler", bar=("B", "C"), length="90 mm").body("rocker", bar=("D", "C"), length="80 mm")
+    found = reach(swing.freedom("crank", "A", start="130 deg", driven=False).mechanism())
+    widest = np.arccos((0.1**2 + 0.08**2 - 0.17**2) / (2.0 * 0.1 * 0.08))
+    assert (found.low, found.high) == pytest.approx((-widest, widest), abs=1e-3)
+    assert found.open == (False, False)
     # an arm that nothing stops turns, though it is not driven round
     assert reach(load_linkage(FOLDER / "bistable.toml")).turns
     cart = linkage("reach-of-a-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
