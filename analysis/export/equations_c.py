@@ -347,9 +347,11 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             f"#define MODEL_IDENTIFIER {_text(kind.identifier(mechanism))}",
             f"#define TOKEN {_text(token(mechanism, kind))}",
             f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};",
+            f"#define TWISTS {len(_twists(mechanism))}",
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
+            f"#define SLIPPED {_text(limits.SLIPPED)}",
             f"#define NO_ACCELERATION {_text(limits.NO_ACCELERATION)}",
             *_unjoined_messages(mechanism),
             "#endif",
@@ -402,9 +404,17 @@ def _tables(mechanism: Mechanism) -> str:
             _array("freedoms", freedoms, "FREEDOMS", "FreedomName"),
             _array("commands", _commands(mechanism), "ROOM(COMMANDS)", "Command"),
             _array("least", rules, "ROOM(BOUNDS)", "Least"),
+            _array("twists", _twists(mechanism), "ROOM(TWISTS)", "Twist"),
             "",
         ]
     )
+
+
+def _twists(mechanism: Mechanism) -> list[str]:
+    """Return a C row of `Twist` for each spring whose whole turns are not counted."""
+    return [
+        f"{{{mechanism.output_names.index(v.name)}, {_text(v.of)}}}" for v in mechanism.variables if v.role == "twist"
+    ]
 
 
 _KINDS = {"Real": "REAL", "Integer": "INTEGER", "String": "STRING"}

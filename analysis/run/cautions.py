@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.limits import SLIPPED
 from linkwork.mechanism import Mechanism
 
 #: Least number of steps at which a run is checked for stiffness: a usual run takes about 50 steps per revolution.
@@ -85,12 +86,7 @@ def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.f
         jumps = np.flatnonzero(np.abs(np.diff(values[:, column])) > pi)
         if len(jumps):
             found.append(f"{name} at t = {time[jumps[0] + 1]:.4g} s")
-    return (
-        f"the torque of {' and '.join(found)} jumps, because its angle passes plus or minus half a turn: whole turns of this "
-        "angle are not counted; a freedom at the pin would count them"
-        if found
-        else ""
-    )
+    return f"the torque of {' and '.join(found)} {SLIPPED}" if found else ""
 
 
 @lru_cache(maxsize=64)

@@ -22,6 +22,7 @@ from ..units import Amount, in_si
 from .angles import coordinate_outputs
 from .arguments import complete_initial_state, complete_inputs, require_kind, takes_published, usual_times
 from .case_files import Case
+from .cautions import twists
 from .events import RunInterrupted, show_progress
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs
@@ -118,11 +119,12 @@ def cosimulate(
             show(t - float(times[0]))
             if interrupted:
                 break
+    time, values = np.array([t for t, _ in recorded]), np.array([row for _, row in recorded])
     trajectory = Trajectory(
-        time=np.array([t for t, _ in recorded]),
-        values=np.array([row for _, row in recorded]),
+        time=time,
+        values=values,
         status=march.status,
-        message=march.message,
+        message="; ".join(filter(None, (march.message, twists(prepared.mechanism, time, values)))),
         names=prepared.mechanism.output_names,
         source=Path(fmu).name + march.title,
         parameters=prepared.parameters,

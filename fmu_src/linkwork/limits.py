@@ -21,6 +21,12 @@ JAMMING = "friction so strong that it may jam the links"
 MASSLESS = "what a force moves has no mass or moment of inertia"
 NO_ACCELERATION = f"{MASSLESS}, a force law has no value, or a speed or parameter is too large"
 
+#: What a run says of a spring whose whole turns are not counted, as the end of "the torque of SPRING at t = TIME s".
+SLIPPED = (
+    "jumps, because its angle passes plus or minus half a turn: whole turns of this angle are not counted; a freedom at the "
+    "pin would count them"
+)
+
 
 class UnjoinedMessages(NamedTuple):
     """Messages for configurations at or near which the links cannot be joined; the same in Python and in C.

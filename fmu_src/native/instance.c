@@ -331,6 +331,21 @@ static bool jams(const Instance *c) {
     return plant_jams(&c->s.plant, c->s.plant.x);
 }
 
+/* Say which spring passed half a turn in the step, in the log, and once in solver.message. */
+static void caution(Instance *c) {
+#if TWISTS > 0
+    char sentence[SENTENCE];
+    Digits time;
+    if (c->s.plant.slipped == 0.0) return;
+    snprintf(sentence, SENTENCE, "the torque of %s at t = %s s " SLIPPED, twists[(int)c->s.plant.slipped - 1].spring,
+             digits(time, c->s.plant.slip_time));
+    if (!c->s.message[0]) note(c, GOOD, sentence);
+    instance_say(c, WARNING, "%s", sentence);
+#else
+    (void)c;
+#endif
+}
+
 Status instance_step(Instance *c, double time, double step, const Watch *watch) {
     char sentence[SENTENCE];
     Digits end, stop;
@@ -347,7 +362,8 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch) 
     c->s.step = reason;
     c->stale = true; /* also after a refused step: its updates may have read outputs */
     if (reason == GOOD) {
-        forget(c);
+        if (c->s.reason != GOOD) forget(c); /* but a caution stays */
+        caution(c);
         c->stopped = ended != GOOD;
         if (ended != GOOD)
             note(c, ended, jams(c) ? "the step ended early: " JAMMING : "the step ended early, at the " ASSEMBLY);

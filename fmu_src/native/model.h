@@ -52,6 +52,12 @@ typedef struct {
     const char *requirement;
 } Least;
 
+/* A spring whose whole turns are not counted: the output that is the angle by which it is twisted, and its name. */
+typedef struct {
+    int output;
+    const char *spring;
+} Twist;
+
 /* The coordinates in words. */
 typedef struct {
     const char *name, *unit;
@@ -64,6 +70,7 @@ TABLE const int state_at[STATES];
 TABLE const int tolerance_at, status_at, message_at;
 TABLE const Command commands[ROOM(COMMANDS)];
 TABLE const Least least[ROOM(BOUNDS)];
+TABLE const Twist twists[ROOM(TWISTS)];
 
 /* The equations, as CasADi writes them. x: state, m: modes, u: inputs, p: constants with the energy at the start after them,
    d: of a change, g: of a gradient. */

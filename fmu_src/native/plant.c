@@ -134,6 +134,7 @@ void plant_reset(Plant *a) {
 }
 
 #define DEGREE 57.29577951308232
+#define HALF_TURN 3.141592653589793
 
 static void configuration(const double x[STATES], char text[SENTENCE]) {
     int end = 0;
@@ -295,6 +296,25 @@ Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTEN
     return GOOD;
 }
 
+/* Follow the springs whose turns are not counted to a state; notice the first of them that passes half a turn. */
+static void follow_twists(Plant *a, const double x[STATES], double time) {
+#if TWISTS > 0
+    double u[ROOM(INPUTS)], y[ROOM(OUTPUTS)];
+    inputs(a, u);
+    call(equations_outputs, (const double *[]){x, a->modes, u, a->p}, (double *[]){y});
+    for (int i = 0; i < TWISTS; i++) {
+        double angle = y[twists[i].output];
+        if (fabs(angle - a->twist[i]) > HALF_TURN && a->slipped == 0.0) {
+            a->slipped = 1.0 + i;
+            a->slip_time = time;
+        }
+        a->twist[i] = angle;
+    }
+#else
+    (void)a, (void)x, (void)time;
+#endif
+}
+
 /* The integrator: see step.h */
 
 /* What the slope of the state needs beside it: the plant, whose inputs change over the step. */
@@ -414,6 +434,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
             /* a step cut short by the end of the interval does not shorten the one carried over */
             proposal = fmax(h < proposal ? proposal : 0.0, step_factor(error) * h);
             memcpy(x, result, sizeof result);
+            follow_twists(a, x, time + done + h);
             a->step_size = proposal;
             if (last) return GOOD;
             done += h;
@@ -476,6 +497,8 @@ Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool e
     apply(a, all, x);
     memset(a->fresh, 0, sizeof a->fresh);
     a->slopes_from = 0.0;
+    follow_twists(a, x, time); /* a start, and what was set since the last step, is no motion */
+    a->slipped = 0.0;
     if (watch) expect_inputs(a, 0.0, false);
     reason = integrate(a, x, time, &duration, watch, early, ended, sentence);
     if (reason != GOOD) {

@@ -35,10 +35,12 @@ typedef struct {
     double modes[ROOM(MODES)];
     double p[CONSTANTS];
     double x[STATES];
-    double scale[STATES];               /* magnitudes below which the error of a component is absolute */
-    double outputs[OUTPUTS];            /* the last that could be computed */
-    double derivative[STATES];          /* likewise */
-    double begun;                       /* 1 where state and constants follow from what is given */
+    double scale[STATES];       /* magnitudes below which the error of a component is absolute */
+    double outputs[OUTPUTS];    /* the last that could be computed */
+    double derivative[STATES];  /* likewise */
+    double twist[ROOM(TWISTS)]; /* angles of the springs whose turns are not counted, at the last step of the integrator */
+    double slipped, slip_time;  /* 1 + number of the first that passed half a turn in the last step, and when; or 0 */
+    double begun;               /* 1 where state and constants follow from what is given */
     double time, start_time, stop_time; /* infinite: none */
     double master_tolerance;            /* 0: none */
     double tolerance, step_size;

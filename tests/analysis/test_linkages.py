@@ -14,11 +14,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 from scipy import integrate
 
 from analysis import figures, variant
+from analysis.export import NATIVE, build_native
 from analysis.files import entry_names
 from analysis.linear import linearise
 from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, reach, read_description
@@ -37,10 +39,11 @@ from analysis.periodic import (
     search_orbits,
     steady_drive,
 )
-from analysis.run import Inputs, Trajectory, load_case, simulate
+from analysis.run import Inputs, Trajectory, cosimulate, load_case, simulate
 from analysis.tuning import Limit, Wish, tune
 from analysis.tuning.conditions import limited_value, sample_turn
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
@@ -1084,16 +1087,47 @@ def test_a_law_of_an_angle_that_passes_half_a_turn_is_that_of_a_spring(law: Any)
     assert not runs[1].message
 
 
-@pytest.mark.parametrize("method", ["compiled", "DOP853"])
-def test_a_spring_whose_turns_nothing_counts_is_named_where_its_torque_jumps(method: str) -> None:
-    """At the bearing of the follower of a drag link, which goes round."""
+def drag_link() -> Mechanism:
+    """A spring at the bearing of the follower, which goes round: nothing counts its turns."""
     built = linkage("drag-link", ground={"A": (0, 0), "D": ("50 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
     built.body("rod", bar=("B", "C"), length="110 mm", mass=1.0, inertia=1e-3)
     built.body("follower", bar=("D", "C"), length="120 mm", mass=1.0, inertia=1e-3)
-    built.spring("hair", at="D", stiffness="0.1 N*m/rad").freedom("crank", "A", speed="60 rpm").mechanism()
+    return built.spring("hair", at="D", stiffness="0.1 N*m/rad").freedom("crank", "A", speed="60 rpm").mechanism()
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_a_spring_whose_turns_nothing_counts_is_named_where_its_torque_jumps(method: str) -> None:
+    drag_link()
     run = simulate("drag-link", stop_time=1.0, **({} if method == "compiled" else {"method": method}))
     assert "hair at t = 0." in run.message
     assert "whole turns of this angle are not counted" in run.message
+
+
+def test_fmus_name_such_a_spring_too(tmp_path: Path) -> None:
+    """Also within a step of a whole turn, and to the end of the run."""
+    fmu = build_native(drag_link(), NATIVE, tmp_path)
+    said = [cosimulate(fmu, "drag-link", stop_time=1.0).message]
+    description = fmpy.read_model_description(fmu)
+
+    def log(*told: Any) -> None:
+        said.append(told[-1].decode())
+
+    one = fmpy.simulation.instantiate_fmu(
+        fmpy.extract(fmu, str(tmp_path / "there")), description, "CoSimulation", debug_logging=True, logger=log
+    )
+    one.setupExperiment(startTime=0.0)
+    one.enterInitializationMode()
+    one.exitInitializationMode()
+    for time in (0.0, 1.0):
+        one.doStep(time, 1.0 if time == 0.0 else 0.1)
+        reference = {v.name: v.valueReference for v in description.modelVariables}
+        assert one.getInteger([reference["solver.status"]]) == [0]
+        said.append(one.getString([reference["solver.message"]])[0].decode())
+    one.freeInstance()
+    assert len(said) == 4
+    for message in said:
+        assert "hair at t = 0." in message
+        assert "whole turns of this angle are not counted" in message
 
 
 def test_two_shafts_on_one_axis_are_joined_by_a_freedom_or_by_bodies() -> None:
