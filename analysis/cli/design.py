@@ -138,7 +138,7 @@ def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, m
 
 
 def write_solution(
-    best: Assessment, folder: Path, title: str, *, make: MachineSpec, plots: bool, animate: bool
+    best: Assessment, folder: Path, title: str, *, make: MachineSpec, plot: bool, animate: bool
 ) -> list[Path]:
     """Write all files of one solution: drawings, plates, curve, report, parameters, case of a run, plots; return the paths."""
     from .. import figures
@@ -158,8 +158,8 @@ def write_solution(
         written.append(write_tables(case, solution.run_case(make, title), head=make.describe_masses()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
-    written += common.save_plot(plots, solution, folder / "best-linkage.png", title=title)
-    if plots:
+    written += common.save_plot(plot, solution, folder / "best-linkage.png", title=title)
+    if plot:
         forces = _forces(solution, make)
         sheet = figures.plot_sheet(best, forces, title=title, made=make.describe(forces=forces is not None))
         written.append(save_figure(sheet, folder / "best-sheet.pdf"))
@@ -194,7 +194,7 @@ def synthesize(
     seed: int | None,
     jobs: int | None,
     out: str,
-    plots: bool,
+    plot: bool,
     animate: bool,
 ) -> None:
     """Find linkages for the task of a CASE file (TOML or JSON): a path, a function, a quick return or a motion.
@@ -246,9 +246,9 @@ def synthesize(
             "the same curve from other pivots: the first one's cognates", others, violated=chosen.worst_violation
         )
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
-    written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
+    written += write_solution(best, folder, chosen.title, make=chosen.make, plot=plot, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
-    written += common.save_plot(plots, result, folder / "alternatives.png", title=chosen.title)
+    written += common.save_plot(plot, result, folder / "alternatives.png", title=chosen.title)
     common.print_paths(written)
     if best.poor:
         common.print_error(f"note: {best.poor}")
@@ -265,11 +265,11 @@ def synthesize(
     except TradeOffInterrupted as error:
         traded, stopped = error.trade_off, error
     if traded is not None:
-        common.print_paths(_trade_off(traded, chosen.title, folder, plots))
+        common.print_paths(_trade_off(traded, chosen.title, folder, plot))
     leave_if_stopped(stopped, "what there is is kept")
 
 
-def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[Path]:
+def _trade_off(traded: TradeOff, title: str, folder: Path, plot: bool) -> list[Path]:
     from ..synthesis import OVER, format_limit, quality_cells, quality_headings
 
     task = next((s.task for s in traded.solutions if s is not None), None)
@@ -284,4 +284,4 @@ def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[
     ]
     common.show_table(f"{title}: error against the {what}", headings, rows)
     written = [traded.to_csv(folder / "trade-off.csv")]
-    return written + common.save_plot(plots, traded, folder / "trade-off.png", title=title)
+    return written + common.save_plot(plot, traded, folder / "trade-off.png", title=title)

@@ -24,7 +24,7 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
 @common.plot_option
 @common.out_option(help="Folder for the results.")
 @common.report_errors
-def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
+def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plot: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
     For five poses of a body there are up to six four-bars; for four poses there is a curve of dyads (Burmester). For three to
@@ -80,9 +80,9 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
             )
             written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
     if not isinstance(found, Generators):
-        written += common.save_plot(plots, found, folder / "poses.png", title=chosen.title)
+        written += common.save_plot(plot, found, folder / "poses.png", title=chosen.title)
     if found.solutions:
-        written += common.save_plot(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
+        written += common.save_plot(plot, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
     common.print_paths(written)
     if not any(s.verdicts.sound for s in found.solutions):
         common.print_error(f"note: {found.describe()}")

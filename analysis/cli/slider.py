@@ -39,7 +39,7 @@ def slider_motion(
     seed: int | None,
     jobs: int | None,
     out: str,
-    plots: bool,
+    plot: bool,
 ) -> None:
     """Move the rocker pivot of a linkage with a slider, so that it does the task of a CASE file (TOML or JSON) better.
 
@@ -64,7 +64,7 @@ def slider_motion(
     chosen = load_slider_case(case, overrides)
     solution, stopped = _find_motion(chosen) if chosen.strategy is None else _find_strategy(chosen)
     folder = common.output_folder(out)
-    written = _write_solution(solution, folder, chosen, plots)
+    written = _write_solution(solution, folder, chosen, plot)
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
@@ -72,7 +72,7 @@ def slider_motion(
                 "note: no forces are computed for a five-bar with a geared second crank: run its linkage.toml"
             )
         else:
-            written += _dynamics(chosen, solution, folder, plots)
+            written += _dynamics(chosen, solution, folder, plot)
     elif isinstance(pivot, SliderMotion):
         turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
         written.append(write_csv(folder / "motion.csv", _motion_columns(pivot.series, turn)))
@@ -159,7 +159,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     common.show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
-def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: bool) -> list[Path]:
+def _write_solution(solution: Solution, folder: Path, case: SliderCase, plot: bool) -> list[Path]:
     from ..synthesis import assess
 
     title, make = case.synthesis.title, case.synthesis.make
@@ -167,7 +167,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
         make = replace(make, speed=case.drive.speed)
     written = write_description_files(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     written += write_linkages([solution], folder, title, make=make)
-    return written + common.save_plot(plots, solution, folder / "linkage.png", title=title)
+    return written + common.save_plot(plot, solution, folder / "linkage.png", title=title)
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 # Dynamics
 
 
-def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
+def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plot: bool) -> list[Path]:
     """Compute and write force, torque and pin forces of a slider motion, and a case file of a run; return the paths.
 
     If the case has a table [tracking], also simulate the motion with a controller.
@@ -210,9 +210,9 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
             head="a controller lets the slider follow its motion: linkwork system run system.toml",
         ),
     ]
-    written += common.save_plot(plots, drive, folder / "motion.png", title=title)
+    written += common.save_plot(plot, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
-        written += _tracking(chosen, drive, folder, plots)
+        written += _tracking(chosen, drive, folder, plot)
     return written
 
 
@@ -243,7 +243,7 @@ def _print_drive(title: str, drive: SliderDrive) -> None:
     _print_rows(f"{title}: the slider's drive at {abs(drive.crank_speed) * 30.0 / np.pi:.5g} rpm", rows)
 
 
-def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool) -> list[Path]:
+def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plot: bool) -> list[Path]:
     from ..files import write_csv
 
     run = chosen.run_tracking(drive)
@@ -274,4 +274,4 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
         "power [W]": run.power,
     }
     written = [write_csv(folder / "tracking.csv", columns)]
-    return written + common.save_plot(plots, run, folder / "tracking.png")
+    return written + common.save_plot(plot, run, folder / "tracking.png")
