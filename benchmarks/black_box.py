@@ -63,8 +63,7 @@ def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
     n = len(first)
     p = edge * (sqrt(n + 1.0) + n - 1.0) / (n * sqrt(2.0))
     q = edge * (sqrt(n + 1.0) - 1.0) / (n * sqrt(2.0))
-    vertices: FloatArray = np.vstack([np.zeros(n), np.full((n, n), q) + (p - q) * np.eye(n)]) + first
-    return vertices
+    return np.vstack([np.zeros(n), np.full((n, n), q) + (p - q) * np.eye(n)]) + first
 
 
 def evolve(
@@ -162,8 +161,7 @@ class BlackBox:
         q = self._linkages(x)
         rotation = self._rotations(x, q)
         charge = sum(np.maximum(value, 0.0) for _, value in self._inequalities(q, rotation))
-        charged: FloatArray = self._errors(q, rotation) + PENALTY * self.normal.weights.sum() * charge
-        return charged
+        return self._errors(q, rotation) + PENALTY * self.normal.weights.sum() * charge
 
     def penalised_quality(self, x: FloatArray) -> float:
         """Return the penalised quality of one linkage; see `penalised_qualities`."""
@@ -226,8 +224,7 @@ class BlackBox:
         turn = np.exp(1j * q[:, 7])
         point = q[:, 6] * np.exp(1j * q[:, 9])
         crank = q[:, 3, None] * np.exp(1j * (rotation + q[:, 8, None]))
-        traced: ComplexArray = (q[:, 0] + 1j * q[:, 1])[:, None] + turn[:, None] * (crank + point[:, None] * coupler)
-        return traced
+        return (q[:, 0] + 1j * q[:, 1])[:, None] + turn[:, None] * (crank + point[:, None] * coupler)
 
     def _errors(self, q: FloatArray, rotation: FloatArray) -> FloatArray:
         normal = self.normal
@@ -238,16 +235,14 @@ class BlackBox:
         if normal.angle is not None:
             squares = squares + self._angle_errors(q, rotation, coupler, rocker, normal.angle) ** 2
         weighted = squares * normal.weights
-        errors: FloatArray = np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
-        return errors
+        return np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
 
     def _angle_errors(
         self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
     ) -> FloatArray:
         """Return the errors of the rocker or coupler angle, converted to lengths; a stretched link counts by its direction."""
         own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
-        left: FloatArray = self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
-        return left
+        return self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
 
     def _rotations(self, x: FloatArray, q: FloatArray) -> FloatArray:
         """Return the crank rotations at the stations, shape (m, n)."""

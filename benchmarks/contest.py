@@ -246,13 +246,11 @@ class PlacedFourBar:
 
     def get_constraints(self) -> list[float]:
         """Return the values of the free unknowns."""
-        values: list[float] = self.q[self.free].tolist()
-        return values
+        return self.q[self.free].tolist()
 
     def get_coords(self) -> list[tuple[float | None, float | None]]:
         """Return the positions of A, D, B, C, P."""
-        coords: list[tuple[float | None, float | None]] = self.linkage.get_coords()
-        return coords
+        return self.linkage.get_coords()
 
     def set_constraints(self, values: Sequence[float]) -> None:
         """Set the free unknowns, and put the joints at their positions one step before the start."""
@@ -270,8 +268,7 @@ class PlacedFourBar:
 
     def track(self) -> ComplexArray:
         """Return A, D, B, C, P over the turn by pylinkage's compiled solver, shape (n, 5); NaN if the links do not close."""
-        track: ComplexArray = self.linkage.step_fast(self.n) @ np.array([1.0, 1j])
-        return track
+        return self.linkage.step_fast(self.n) @ np.array([1.0, 1j])
 
 
 class PylinkageScore:

@@ -93,10 +93,7 @@ def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
     dx, dy = q.ground_length - q.crank_length * c2, -q.crank_length * s2
     g = close_loop(c2, s2, dx, dy, q.coupler_length, q.rocker_length, float(q.branch))
     point = q.point_distance * np.exp(1j * q.point_angle) * (g.c3 + 1j * g.s3)
-    curve: ComplexArray = complex(q.pivot_x, q.pivot_y) + np.exp(1j * q.ground_angle) * (
-        q.crank_length * (c2 + 1j * s2) + point
-    )
-    return curve
+    return complex(q.pivot_x, q.pivot_y) + np.exp(1j * q.ground_angle) * (q.crank_length * (c2 + 1j * s2) + point)
 
 
 def time_per_call(run: Callable[[int], object], calls: int) -> float:

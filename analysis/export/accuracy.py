@@ -79,8 +79,7 @@ def rows(mechanism: Mechanism) -> Iterator[list[float]]:
 
 def stored_rows(mechanism: Mechanism) -> list[list[float]]:
     """Return the rows of a mechanism in `DATA`; an empty list if the mechanism is not there."""
-    found: list[list[float]] = json.loads(DATA.read_text(encoding="utf-8")).get(mechanism.name, [])
-    return found
+    return json.loads(DATA.read_text(encoding="utf-8")).get(mechanism.name, [])
 
 
 @cache

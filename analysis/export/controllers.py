@@ -139,8 +139,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         """Return values of variables; before the first sample, outputs are computed from the present inputs."""
         if self.count == 0:
             self.preview()
-        values: list[float] = super().get_real(vrs)
-        return values
+        return super().get_real(vrs)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused: after the first sample, an invalid parameter or any sample time."""

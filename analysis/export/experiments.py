@@ -224,8 +224,7 @@ def _deviations(mechanism: Mechanism, found: list[list[float]], reference: list[
     """Return for each row of results the largest relative difference from a reference, as `analysis.run.verify` measures it."""
     wanted = np.array(reference)[:, 1:]
     scales = deviation_scales(wanted.T, _result_units(mechanism))
-    largest: NDArray[np.float64] = (np.abs(np.array(found)[:, 1:] - wanted) / scales).max(axis=1)
-    return largest
+    return (np.abs(np.array(found)[:, 1:] - wanted) / scales).max(axis=1)
 
 
 def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:

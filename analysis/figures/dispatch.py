@@ -101,8 +101,7 @@ def plot(result: Any, *details: Any, **options: Any) -> Figure:
     DrawingError
         If this type has no picture.
     """
-    figure: Figure = _registered_function(plot, result, "plot")(result, *details, **options)
-    return figure
+    return _registered_function(plot, result, "plot")(result, *details, **options)
 
 
 @singledispatch
@@ -146,8 +145,7 @@ def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Pat
     DrawingError
         If this type has no animation.
     """
-    written: Path = _registered_function(animate, result, "animation")(result, path, *details, **options)
-    return written
+    return _registered_function(animate, result, "animation")(result, path, *details, **options)
 
 
 @singledispatch
@@ -166,8 +164,7 @@ def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
     """
     if not _has_planar_drawing(parameters):
         raise DrawingError(type(parameters), "picture")
-    caption: str = import_module(".scheme", __package__).draw_run(parameters, axis, run)
-    return caption
+    return import_module(".scheme", __package__).draw_run(parameters, axis, run)
 
 
 def _has_planar_drawing(parameters: object) -> bool:

@@ -165,8 +165,7 @@ class _Axes:
 
 
 def _panel(part: Any) -> Panel:
-    panel: Panel = part if isinstance(part, Panel) else part.panel
-    return panel
+    return part if isinstance(part, Panel) else part.panel
 
 
 def _line(text: str) -> str:

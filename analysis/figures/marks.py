@@ -274,8 +274,7 @@ def roomiest_position(
         room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
     if away is not None:
         room = room + (places - pin) @ away
-    best: FloatArray = places[int(np.argmax(room))]
-    return best
+    return places[int(np.argmax(room))]
 
 
 #: For each kind of text: the function that moves it, and the two lists of places, the best first.

@@ -86,8 +86,7 @@ def plot_outputs(
 
         def place(number: int, **options: Any) -> Axes:
             rows, places = np.nonzero(grid == number)
-            made: Axes = figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
-            return made
+            return figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
 
         axes: list[Axes] = []
         for number, panel in enumerate(panels):

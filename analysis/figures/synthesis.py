@@ -190,8 +190,7 @@ def _framed_rotations(scene: syn.LinkageScene) -> FloatArray:
     """Return crank rotations (rad) at which the links can be joined; the linkage must fit in the frame at all of them."""
     rotation, angle = scene.transmission
     joined = rotation[np.isfinite(angle)]
-    chosen: FloatArray = joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
-    return chosen
+    return joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
 
 
 def magnification(worst: float, extent: float) -> float:

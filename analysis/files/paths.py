@@ -169,8 +169,7 @@ def find_problems(fmu: str | Path) -> list[str]:
             plain = plain and not any("\\" in file.orig_filename for file in archive.filelist)
     except Exception:  # FMPy and lxml raise exceptions of their own
         plain = False
-    problems: list[str] = [] if plain else validate_fmu(str(fmu))
-    return problems
+    return [] if plain else validate_fmu(str(fmu))
 
 
 def _printable(path: Path) -> str:

@@ -259,8 +259,7 @@ def load_array(path: str | Path) -> NDArray[np.float64] | None:
     if hashlib.sha256(content).digest() != digest:
         warnings.warn(f"{path} is damaged: what was in it is computed again", RuntimeWarning, stacklevel=2)
         return None
-    values: NDArray[np.float64] = np.load(io.BytesIO(content))
-    return values
+    return np.load(io.BytesIO(content))
 
 
 _DIGEST = hashlib.sha256().digest_size

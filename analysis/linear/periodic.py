@@ -215,8 +215,7 @@ class PeriodicModel(Matrices):
         )
         if not result.success:
             raise LinearModelError(f"the monodromy matrix could not be integrated: {result.message}")
-        matrix: FloatArray = result.y[:, -1].reshape(size, size)
-        return matrix
+        return result.y[:, -1].reshape(size, size)
 
 
 @takes_published()

@@ -72,8 +72,7 @@ class _Linear:
         held, forces = list(self.held), np.array(list(self.held.values()))
 
         def rates(t: float, x: FloatArray) -> FloatArray:
-            change: FloatArray = self.a(t) @ x + self.b(t)[:, held] @ (forces - self.acting(t)[held])
-            return change
+            return self.a(t) @ x + self.b(t)[:, held] @ (forces - self.acting(t)[held])
 
         for number in range(count):
             t = time + number * h

@@ -501,8 +501,7 @@ class Follower:
         )
 
     def _scale_point(self, point: Point) -> Vector:
-        scaled: Vector = np.append(point.y, point.parameter) / self.scale
-        return scaled
+        return np.append(point.y, point.parameter) / self.scale
 
     def _find_outer_turn(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
         """Find the outermost point of a step that leaves the bounds and comes back; return it and its distance along the step.

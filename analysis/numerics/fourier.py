@@ -92,8 +92,7 @@ class FourierSeries:
 
     def __call__(self, x: ArrayLike) -> NDArray[np.float64]:
         phase = np.multiply.outer(np.asarray(x, dtype=float), np.arange(len(self.cos)))
-        value: NDArray[np.float64] = np.cos(phase) @ self.cos + np.sin(phase) @ self.sin
-        return value
+        return np.cos(phase) @ self.cos + np.sin(phase) @ self.sin
 
     def __add__(self, other: FourierSeries | float) -> FourierSeries:
         if not isinstance(other, FourierSeries):

@@ -36,8 +36,7 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
         return known
     if known not in PUBLISHED:
         raise files.unknown_name(known, PUBLISHED, f"published set {known!r}")
-    found: PublishedSet = PUBLISHED[known]
-    return found
+    return PUBLISHED[known]
 
 
 def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:

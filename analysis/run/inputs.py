@@ -250,8 +250,7 @@ def read_start(mechanism: Mechanism, data: Any, base: InitialState | None = None
         If a name is unknown or a value is wrong.
     """
     readers = {name: files.Quantity(variable.unit) for name, variable in mechanism.initial_variables.items()}
-    made: InitialState = files.read(mechanism.initial, data, "initial", readers=readers, base=base)
-    return made
+    return files.read(mechanism.initial, data, "initial", readers=readers, base=base)
 
 
 @lru_cache(maxsize=64)

@@ -109,8 +109,7 @@ class SliderDrive:
 
     def pin_force(self, pin: str) -> FloatArray:
         """Return the magnitude of the force in pin A, B, C or D (N), shape (n,)."""
-        magnitude: FloatArray = np.hypot(self[f"pin.{pin}.fx"], self[f"pin.{pin}.fy"])
-        return magnitude
+        return np.hypot(self[f"pin.{pin}.fx"], self[f"pin.{pin}.fy"])
 
     def turn(self, samples: int) -> SliderDrive:
         """Return the drive of the same motion with another number of samples."""

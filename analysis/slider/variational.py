@@ -177,10 +177,9 @@ class _Problem:
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
         """Return b, the position of the crank pin B relative to the guide's zero, in the frame of the guide."""
         k = self.linkage
-        b: NDArray[np.complex128] = (
-            k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length
-        ) * np.exp(-1j * self.guide_angle)
-        return b
+        return (k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length) * np.exp(
+            -1j * self.guide_angle
+        )
 
     def minima(self, rotation: FloatArray, target: NDArray[np.complex128] | FloatArray) -> _Minima:
         """Return the candidates for minima of the error over the slider position, with targets of shape (n,)."""
@@ -364,8 +363,7 @@ def variational_motion(
 
 def _wrap_angles(angle: FloatArray) -> FloatArray:
     """Return angles (rad) shifted by whole turns into (-pi, pi]."""
-    value: FloatArray = pi - np.mod(pi - angle, 2.0 * pi)
-    return value
+    return pi - np.mod(pi - angle, 2.0 * pi)
 
 
 def _describe_unreachable(problem: _Problem, phi: FloatArray, n: int) -> str:

@@ -306,8 +306,7 @@ def _rotation(vector: Array) -> Array:
     """Return rotation matrices (n, 3, 3) of vectors (n, 3), which are the axis times twice tan(angle / 2) (Cayley)."""
     half = 0.5 * vector
     m = skew(half).real
-    rotation: Array = np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
-    return rotation
+    return np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
 
 
 def _check(found: Closure) -> None:

@@ -108,8 +108,7 @@ def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit, coordinate: int 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     """Return the orbit that begins at a spot; the orbit's ``residual`` tells how nearly the orbit is closed."""
-    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
-    return orbit
+    return OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
 
 
 def sample_turn(orbit: PeriodicOrbit, limit: Limit) -> Turn:
@@ -249,8 +248,7 @@ class PickedMotion:
         The partial derivatives are with respect to y, the level and the changes.
         """
         n = len(self.spot.y) + 1
-        found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
-        return found
+        return slopes[..., n:] + slopes[..., :n] @ self.slopes
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
         """Return the derivatives of an output at a crank angle with respect to the changes, shape (k,).
@@ -458,8 +456,7 @@ class StabilityLossBeyond:
         return self._share * (self.place.find(x).spot.level - self.level)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        slopes: FloatArray = self._share * self.place.find(x).slopes[-1]
-        return slopes
+        return self._share * self.place.find(x).slopes[-1]
 
 
 class PeakBeyond:

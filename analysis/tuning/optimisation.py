@@ -171,10 +171,7 @@ class _Values:
 
     def function(self, count: int) -> Callable[[Any], Any]:
         """Return the values of the conditions as a CasADi function of ``count`` changes."""
-        function: Callable[[Any], Any] = symbolic.wrap_function(
-            "conditions", count, len(self.conditions), self.__call__
-        )
-        return function
+        return symbolic.wrap_function("conditions", count, len(self.conditions), self.__call__)
 
 
 #: Greatest number of rounds of the exchange, and of combinations of moves that are tried.

@@ -200,8 +200,7 @@ def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[
         rate, bend = (n * (sin * c - cos * s)).sum(axis=2), (-(n**2) * (cos * c + sin * s)).sum(axis=2)
         ends = ends - np.divide(rate, bend, out=np.zeros_like(rate), where=bend != 0.0)
     c, s = np.cos(ends[..., None] * n), np.sin(ends[..., None] * n)
-    swings: NDArray[np.float64] = 0.5 * np.ptp(np.hstack([(cos * c + sin * s).sum(axis=2), samples]), axis=1)
-    return swings
+    return 0.5 * np.ptp(np.hstack([(cos * c + sin * s).sum(axis=2), samples]), axis=1)
 
 
 def _require_order(order: int) -> None:

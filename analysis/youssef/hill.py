@@ -106,8 +106,7 @@ def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
 def _sample_series(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
     """Return the values of the n series of a table (see `_table`) at given points, shape (n, number of points)."""
     cos, sin = _waves(points, table.shape[2] - 1)
-    values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
-    return values
+    return table[0] @ cos + table[1] @ sin
 
 
 def _tables(equations: Sequence[PeriodicEquation]) -> list[NDArray[np.float64]]:
@@ -198,8 +197,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
 
 def monodromy(equation: PeriodicEquation, *, steps: int | None = None) -> NDArray[np.float64]:
     """Return the monodromy matrix of one equation, shape (2, 2); see `monodromies`."""
-    matrix: NDArray[np.float64] = monodromies([equation], steps=steps)[0]
-    return matrix
+    return monodromies([equation], steps=steps)[0]
 
 
 def determinant(equation: PeriodicEquation) -> float:
@@ -227,8 +225,7 @@ def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
     They are whole numbers for the multiplier +1 (period 2 pi), half-integers for the multiplier -1 (period 4 pi).
     """
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
-    k: NDArray[np.float64] = first + np.arange(count, dtype=float)
-    return k
+    return first + np.arange(count, dtype=float)
 
 
 def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
@@ -243,8 +240,7 @@ def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
 def operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Return the matrix of the operator a D^2 + b D + c in the basis exp(i k x), k in steps of 1; shape (len(k), len(k))."""
     a, b, c = (_toeplitz(series, len(k)) for series in (equation.a, equation.b, equation.c))
-    matrix: NDArray[np.complex128] = -a * k**2 + 1j * b * k + c
-    return matrix
+    return -a * k**2 + 1j * b * k + c
 
 
 def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) -> NDArray[np.complex128]:
@@ -284,8 +280,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
     middle = values[centres <= max(0.25 * n, np.sort(centres)[3])]
     second = middle[np.argmax(np.abs(middle - first))]
     pair = np.array([first, second])
-    ordered: NDArray[np.complex128] = pair[np.argsort(-np.abs(pair), kind="stable")]
-    return ordered
+    return pair[np.argsort(-np.abs(pair), kind="stable")]
 
 
 def boundary_stiffnesses(
@@ -406,8 +401,7 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
         others = ~inside
         through = left[np.ix_(inside, others)] / (k0 * (k[others] ** 2 - n * n)) @ left[np.ix_(others, inside)]
         near, weight = v[np.ix_(inside, inside)] - through, s[np.ix_(inside, inside)]
-    found: NDArray[np.complex128] = scipy.linalg.eigvals(near, weight)
-    return found
+    return scipy.linalg.eigvals(near, weight)
 
 
 def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:

@@ -137,8 +137,7 @@ class Grid:
         """Return the starts of the orbits at up to nine grid points around (x, y), roughly the nearest first; shape (k, n)."""
         across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
         starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])
-        kept: FloatArray = starts[~np.isnan(starts).any(axis=1)]
-        return kept
+        return starts[~np.isnan(starts).any(axis=1)]
 
     def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
         """Return the `Stability` of the orbit at each point, None where there is no orbit; object array, shape (ny, nx)."""

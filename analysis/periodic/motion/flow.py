@@ -234,8 +234,7 @@ class Flow:
                         code = MachineCode([self.function_in_lanes(n - IN_LANES, switched)], LANES)
                     self._addresses[int(switched), n] = code.addresses[_NAMES[n % IN_LANES]]
                     self._code[switched, n] = code
-        addresses: NDArray[np.int64] = self._addresses[int(switched)]
-        return addresses
+        return self._addresses[int(switched)]
 
     def fingerprint(self, *which: int, switched: bool = False) -> str:
         """Return, as one text, the hashes of the machine code of the functions with the indices ``which``."""
@@ -269,10 +268,7 @@ class Flow:
 
     def whole_turns(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the whole turns of angles in differences of y, shape (..., n)."""
-        whole: NDArray[np.float64] = self.angle_periods * np.round(
-            away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0)
-        )
-        return whole
+        return self.angle_periods * np.round(away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0))
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
         """Return the turns per turn of the crank of each coordinate in y that goes round, by FMI name.

@@ -274,8 +274,7 @@ class PeriodicOrbit(NotebookResult):
         """The mechanism and its drive as arrays for the kernels."""
         if "point" not in self._kept:
             self._kept["point"] = operating_point(self.parameters, self.drive)
-        point: OperatingPoint = self._kept["point"]
-        return point
+        return self._kept["point"]
 
     @property
     def flow(self) -> Flow:
@@ -287,8 +286,7 @@ class PeriodicOrbit(NotebookResult):
         """Scale of each component of y, its typical magnitude, shape (n,): see `motion_scales`."""
         if "scale" not in self._kept:
             self._kept["scale"] = self.point.scale(self.start)
-        scale: FloatArray = self._kept["scale"]
-        return scale
+        return self._kept["scale"]
 
     @property
     def periods(self) -> int:
@@ -323,8 +321,7 @@ class PeriodicOrbit(NotebookResult):
         """Floquet multipliers, the largest modulus first, shape (n,)."""
         if "multipliers" not in self._kept:
             self._kept["multipliers"] = multipliers(self.monodromy)
-        found: NDArray[np.complex128] = self._kept["multipliers"]
-        return found
+        return self._kept["multipliers"]
 
     def distance(self, start: FloatArray) -> float:
         """Return the greatest difference of a start y from that of this orbit, relative to the scale, without whole turns."""
@@ -401,8 +398,7 @@ class PeriodicOrbit(NotebookResult):
         if "amplitudes" not in self._kept:
             names = [name for name, _ in self.flow.components[: self.flow.swing_count]]
             self._kept["amplitudes"] = self.resolved_turn(names).amplitudes
-        amplitudes: FloatArray = self._kept["amplitudes"]
-        return amplitudes
+        return self._kept["amplitudes"]
 
     def clearance(self, samples: int = SAMPLES) -> float:
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""

@@ -293,8 +293,7 @@ class Variations:
 
     def _gains(self, forcing: FloatArray) -> FloatArray:
         k, n = len(self.h), self.flow.size
-        gains: FloatArray = self._to_end @ forcing.reshape(k, _POINTS * n, -1)
-        return gains
+        return self._to_end @ forcing.reshape(k, _POINTS * n, -1)
 
     def _node_values(self, starts: FloatArray, forcing: FloatArray) -> FloatArray:
         k, n = len(self.h), self.flow.size
@@ -334,8 +333,7 @@ class Variations:
 
     def integral(self, values: FloatArray) -> FloatArray:
         """Integrate over the period a quantity with given values at the nodes, shape (k, s, ...)."""
-        found: FloatArray = np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
-        return found
+        return np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
         """Return the derivative of a quantity with respect to the crank angle, at a position on a panel.

@@ -474,5 +474,4 @@ KINDS: Mapping[str, type] = {
 
 def read_task(value: Any, name: str, *, folder: Path) -> Task:
     """Read the task from the table ``[task]``; names of further files are relative to ``folder``."""
-    task: Task = Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)
-    return task
+    return Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)

@@ -47,8 +47,7 @@ TURN = 360
 
 def wrap_angles(angle: FloatArray) -> FloatArray:
     """Wrap angles (rad) to [-pi, pi)."""
-    value: FloatArray = (angle + pi) % (2.0 * pi) - pi
-    return value
+    return (angle + pi) % (2.0 * pi) - pi
 
 
 def bar_mass_properties(length: Any, line: float, width: float) -> tuple[Any, Any]:
@@ -198,8 +197,7 @@ class Linkage:
 
     def crank_angle(self, rotation: ArrayLike) -> FloatArray:
         """Return th2, the crank angle from the ground link, at rotations of the input shaft (rad)."""
-        value: FloatArray = self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
-        return value
+        return self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
 
     @classmethod
     def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
@@ -272,14 +270,12 @@ class Linkage:
     def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
         """Return the direction of the coupler in the plane plus the output angle (rad), continuous over the rotations."""
         g = self.directions(rotation)
-        turned: FloatArray = np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
-        return turned
+        return np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
 
     def rocker_angle(self, rotation: ArrayLike) -> FloatArray:
         """Return the rocker's angle th4 from the ground link plus the output angle (rad), continuous over the rotations."""
         g = self.directions(rotation)
-        turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
-        return turned
+        return np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
 
     def slider(self, rotation: ArrayLike) -> tuple[FloatArray, float] | None:
         """Return the position of the slider on its guide from E (m), and the guide's direction from the ground link (rad).
@@ -291,8 +287,7 @@ class Linkage:
     def transmission(self, rotation: ArrayLike) -> FloatArray:
         """Return the acute angle between coupler and rocker (rad), 0 at the limit of assembly, NaN beyond."""
         g = self.directions(rotation)
-        angle: FloatArray = np.arctan2(np.abs(g[5]), np.abs(g[4]))
-        return angle
+        return np.arctan2(np.abs(g[5]), np.abs(g[4]))
 
     def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
         """Return the positions of A, B, C, D, the end E of the ground link, and P in the plane (m) at one crank rotation.
@@ -361,8 +356,7 @@ class Linkage:
         dx, dy = self.displacement(rotation)
         th2 = self.crank_angle(rotation)
         along = self.ground_length + dx - self.crank_length * np.cos(th2)
-        reach: FloatArray = self.distance(along, dy - self.crank_length * np.sin(th2))
-        return reach
+        return self.distance(along, dy - self.crank_length * np.sin(th2))
 
     @staticmethod
     def distance(along: Any, across: Any) -> Any:
@@ -375,8 +369,7 @@ class Linkage:
 
         For a four-bar it is `close_loop` of the five-bar model; `SliderCrank` has its own.
         """
-        joined: Callable[..., Any] = symbolic_equations(FIVE_BAR).close_loop
-        return joined
+        return symbolic_equations(FIVE_BAR).close_loop
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
@@ -412,8 +405,7 @@ class Linkage:
         The result is outside [-1, 1] if the links cannot be joined.
         """
         l3, l4 = self.coupler_length, self.rocker_length
-        cosine: FloatArray = (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
-        return cosine
+        return (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
 
     def transmission_range(self) -> tuple[float, float]:
         """Return the least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
@@ -576,8 +568,7 @@ class SliderCrank(Linkage):
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
         """Return the cosine of the angle between the coupler and the normal of the guide, from `reach`."""
-        cosine: FloatArray = -reach / self.coupler_length
-        return cosine
+        return -reach / self.coupler_length
 
 
 @in_si(**UNITS)

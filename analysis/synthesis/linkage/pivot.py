@@ -119,8 +119,7 @@ class SecondCrank:
     def angle(self, rotation: ArrayLike) -> FloatArray:
         """Return psi, the angle of the second crank (rad)."""
         phi = np.asarray(rotation, dtype=float)
-        value: FloatArray = gear_turns(self.ratio)[1] * phi + self.phase + self.series(phi)
-        return value
+        return gear_turns(self.ratio)[1] * phi + self.phase + self.series(phi)
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""

@@ -300,8 +300,7 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 
     safe = np.maximum(spread, 1e-300)
     ratio = mean / safe
-    value: FloatArray = safe * np.sqrt(2.0 / pi) * np.exp(-0.5 * ratio**2) + mean * erf(ratio / np.sqrt(2.0))
-    return value
+    return safe * np.sqrt(2.0 / pi) * np.exp(-0.5 * ratio**2) + mean * erf(ratio / np.sqrt(2.0))
 
 
 def _names(linkage: Linkage, normal: Normal) -> list[str]:

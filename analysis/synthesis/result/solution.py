@@ -69,8 +69,7 @@ class Evaluation:
         """Return the combined errors of position and angle, as they enter the quality function (m or rad), shape (n,)."""
         if self.angle_errors is None:
             return np.abs(self.errors)
-        both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
-        return both
+        return np.hypot(self.errors, self.length * self.angle_errors)
 
     @property
     def rms(self) -> float:
@@ -487,8 +486,7 @@ def target_points(task: Task) -> FloatArray | None:
 def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
     """Return the angle between coupler and rocker at C (rad), from 0 to pi; NaN if the links cannot be joined."""
     g = linkage.directions(rotation)
-    angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
-    return angle
+    return np.arctan2(np.abs(g[5]), g[4])
 
 
 def path_rate(linkage: Linkage, rotation: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -500,8 +498,7 @@ def path_rate(linkage: Linkage, rotation: FloatArray, both: NDArray[np.complex12
     step = 1e-6
     ahead, behind = linkage.displacement(rotation + step), linkage.displacement(rotation - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
-    rate: NDArray[np.complex128] = linkage.turns * both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
-    return rate
+    return linkage.turns * both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
 
 
 def nearest_rotations(
@@ -524,8 +521,7 @@ def nearest_rotations(
         at += np.clip(step, -pi / CURVE, pi / CURVE)
     if not whole:
         return np.clip(at, begin, end)
-    unwrapped: FloatArray = np.unwrap(at)
-    return unwrapped
+    return np.unwrap(at)
 
 
 def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:

@@ -285,8 +285,7 @@ class Refinement:
         met = forward * (at[before] + np.clip(share, 0.0, 1.0) * (at[after] - at[before]))
         met[[0, -1]] = forward * at[place[[0, -1]]]
         inner = np.clip(isotonic_regression(met).x, met[0], met[-1])
-        ordered: FloatArray = forward * (inner + APART * np.arange(normal.n))
-        return ordered
+        return forward * (inner + APART * np.arange(normal.n))
 
 
 class _Descent:
@@ -360,8 +359,7 @@ class _Descent:
         width = len(self.begin())
 
         def pad(rows: FloatArray) -> FloatArray:
-            wide: FloatArray = np.pad(rows @ self._stretch, ((0, 0), (0, width - self._stretch.shape[1])))
-            return wide
+            return np.pad(rows @ self._stretch, ((0, 0), (0, width - self._stretch.shape[1])))
 
         def values(y: FloatArray) -> FloatArray:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
@@ -371,8 +369,7 @@ class _Descent:
                 # if the bound is no unknown, the distances are bounded by the size
                 bound = y[-1] if self._bound_unknown else 1.0
                 parts += [bound - near.distance[k] / self._size for near, k in self._bounded_distances(z)]
-            kept: FloatArray = np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
-            return kept
+            return np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
 
         def slopes(y: FloatArray) -> FloatArray:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
@@ -389,8 +386,7 @@ class _Descent:
                 part = pad(-grown / self._size)
                 part[:, -1] = 1.0 if self._bound_unknown else part[:, -1]
                 parts.append(part)
-            every: FloatArray = np.nan_to_num(np.vstack([rows, *parts]))
-            return every
+            return np.nan_to_num(np.vstack([rows, *parts]))
 
         found = [{"type": "ineq", "fun": values, "jac": slopes}]
         if equal.any():

@@ -89,14 +89,12 @@ class _FourBarShapes:
         l1, l2, l3, l4, _ = links.T
         ends = (l1 - l2) ** 2, (l1 + l2) ** 2
         excess = limits.linkage.transmission_excess(l3, l4, *ends, cos(max(least, TURNING)))
-        kept: NDArray[np.bool_] = np.all([one <= 0.0 for one in excess], axis=0)
-        return kept
+        return np.all([one <= 0.0 for one in excess], axis=0)
 
     @staticmethod
     def ratios(start: Start) -> FloatArray:
         """Return the ratios of a start's links, by which similar starts are recognised."""
-        ratios: FloatArray = start.q[3:6] / start.q[2]
-        return ratios
+        return start.q[3:6] / start.q[2]
 
 
 class _SliderCrankShapes(_FourBarShapes):
@@ -274,8 +272,7 @@ def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits)
 
     With this sum the first crank's phase does not affect the coupler curve.
     """
-    turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
-    return turned
+    return 2.0 * pi * shapes[:, 7] + limits.ratio * phase
 
 
 def _size_range(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
@@ -458,8 +455,7 @@ def _solve_projection(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> Co
     right = (weighted * (p if p.ndim == 1 else p[:, None, :])).sum(axis=2)
     bad = ~np.isfinite(gram).all(axis=(1, 2))
     gram[bad], right[bad] = np.eye(basis.shape[1]), np.nan
-    solved: ComplexArray = np.linalg.solve(gram, right[:, :, None])[:, :, 0].astype(complex)
-    return solved
+    return np.linalg.solve(gram, right[:, :, None])[:, :, 0].astype(complex)
 
 
 def _place_paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:

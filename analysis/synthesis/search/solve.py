@@ -413,8 +413,7 @@ def _task_rotations(task: Task, normal: Normal, rotation: NDArray[np.float64] | 
     if own.closed:
         at = np.append(at, 1.0)
         turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
-    rotations: NDArray[np.float64] = np.interp(own.shares, at, turned)
-    return rotations
+    return np.interp(own.shares, at, turned)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -250,10 +250,7 @@ def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
     """
     if n < 1 or not (np.isfinite([low, high]).all() and low < high):
         raise InputError(f"{n} precision points from {low:g} to {high:g}: at least one, between finite limits in order")
-    places: FloatArray = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(
-        (2.0 * np.arange(1, n + 1) - 1.0) * pi / (2 * n)
-    )
-    return places
+    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos((2.0 * np.arange(1, n + 1) - 1.0) * pi / (2 * n))
 
 
 _COMPARISONS: Mapping[type[ast.cmpop], tuple[int, bool]] = {

@@ -72,8 +72,7 @@ def half_lengths(lengths: FloatArray, closed: bool) -> FloatArray:
     """
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
-    both: FloatArray = 0.5 * (before + after)
-    return both
+    return 0.5 * (before + after)
 
 
 def interpolate_polyline(vertices: FloatArray, s: ArrayLike) -> FloatArray:
@@ -178,8 +177,7 @@ class TargetPath:
     def centroid(self) -> FloatArray:
         """Return the centroid of the line itself, not of the area inside (m), shape (2,)."""
         middles, lengths = self._segments()
-        centre: FloatArray = lengths @ middles / lengths.sum()
-        return centre
+        return lengths @ middles / lengths.sum()
 
     @property
     def size(self) -> float:
@@ -244,8 +242,7 @@ class TargetPath:
         # at the tip of a cusp, where the curve turns back on itself, take the tangent before the tip
         tangents = np.where(size > 1e-9, tangents / np.maximum(size, 1e-9), before)
         side = -1.0 if self.closed and self.signed_area < 0.0 else 1.0
-        normals: FloatArray = side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
-        return normals
+        return side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
 
     def reverse(self) -> TargetPath:
         """Return the same curve in the opposite direction; a closed curve starts at the same point."""
@@ -400,8 +397,7 @@ def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) 
     import shapely
 
     line = shapely.LineString(closed_vertices(plane_points(curve, "the curve", 2), closed))
-    distances: FloatArray = shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
-    return distances
+    return shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
 
 
 def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:

@@ -482,8 +482,7 @@ class Normal:
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
-        shares: FloatArray = length[: self.n] / length[-1]
-        return shares
+        return length[: self.n] / length[-1]
 
 
 def replace_weights(task: Task, weights: ArrayLike | None) -> Task:
