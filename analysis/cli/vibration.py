@@ -22,6 +22,8 @@ from .sensitivity import report_sensitivity
 #: Default range of speeds relative to the least and to the greatest natural frequency; it contains 2, near which parametric
 #: resonance begins.
 _RANGE = (0.15, 2.3)
+#: Greatest difference of the starts of one motion, relative to their scale.
+_SAME_MOTION = 1e-3
 
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
@@ -424,7 +426,7 @@ def stability(
                 # the user chose nothing on this axis, and the verdict does not need a range
                 over = name and f" over {name}"
                 missing = InputError(f"no chart{over}, as {option} is not given: {error}")
-    _report_verdict(chosen.case.title, parameters, drive, start, begins=chosen.has_crank_speed(drive))
+    reached = _report_verdict(chosen.case.title, parameters, drive, start, begins=chosen.has_crank_speed(drive))
     if missing is not None:
         raise missing
     if not charted:
@@ -451,6 +453,7 @@ def stability(
         first=write_first_picture,
     )
     _print_regions(found)
+    _note_other_motion(found, reached)
     _print_runs(found)
     more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
     picture = figures.picture(found, title=chosen.case.title)
@@ -475,8 +478,10 @@ def _axis_range(
     return low, high
 
 
-def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begins: bool = False) -> None:
-    """Print the verdict on the stability of the motion that is reached, and for a five-bar that by the linear equation.
+def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begins: bool = False) -> Any:
+    """Print the verdict on the stability of the motion that is reached, which is returned.
+
+    For a five-bar the verdict by the linear equation is printed, too.
 
     ``start`` is a guess of the motion; the machine is run up slowly, or begins there if ``begins``.
     """
@@ -503,6 +508,28 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begi
         common.print_error(
             "note: Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
             "and its multipliers are those of the creep"
+        )
+    return orbit
+
+
+def _note_other_motion(found: Any, reached: Any) -> None:
+    """Print a note if the chart follows another motion at the operating point than the one that the machine reaches."""
+    from ..periodic import OrbitError, newton_orbit, parameter_value
+
+    x, y = (parameter_value(reached.parameters, reached.drive, axis.name) for axis in found.axes)
+    inside = found.grid.x.min() <= x <= found.grid.x.max() and found.grid.y.min() <= y <= found.grid.y.max()
+    starts = found.grid.nearby_starts(x, y)
+    if not (inside and len(starts)):
+        return
+    try:
+        charted = newton_orbit(reached.parameters, reached.drive, start=starts[0], settle=False)
+    except OrbitError:
+        return
+    if charted.distance(reached.start) > _SAME_MOTION:
+        _, size, unit = swing_unit(charted)
+        common.print_error(
+            f"note: at its operating point the chart follows a motion of amplitude {size * charted.amplitude:.5g} {unit}, not "
+            f"the motion of {size * reached.amplitude:.5g} {unit} that the machine reaches: --coexisting shows all motions"
         )
 
 

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -401,6 +402,9 @@ def _tables(mechanism: Mechanism) -> str:
             _array("input_at", [reference[name] for name in mechanism.input_names], "ROOM(INPUTS)"),
             _array("state_at", states(mechanism), "STATES"),
             *(f"LOCAL const int {n}_at = {reference[f'solver.{n}']};" for n in ("tolerance", "status", "message")),
+            _array(
+                "reach", ["INFINITY" if most == inf else _number(most) for most in mechanism.reach], "STATES", "double"
+            ),
             _array("freedoms", freedoms, "FREEDOMS", "FreedomName"),
             _array("commands", _commands(mechanism), "ROOM(COMMANDS)", "Command"),
             _array("least", rules, "ROOM(BOUNDS)", "Least"),

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import minimum_filter
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.limits import LIMIT_SINE
@@ -278,6 +277,8 @@ class _Balance:
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
         """Return starting points for Newton's method: local minima of the imbalance on a grid, least ones at some angles."""
+        from scipy.ndimage import minimum_filter  # takes a quarter of a second
+
         units = {variable.name: variable.unit for variable in self.mechanism.variables}
         names = [field.name for field in fields(self.parameters)]
         lengths = [abs(getattr(self.parameters, name)) for name in names if units[fmi_name(name)] == "m"]

@@ -10,7 +10,6 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
@@ -203,6 +202,8 @@ class PeriodicModel(Matrices):
         LinearModelError
             If SciPy's method fails.
         """
+        from scipy.integrate import solve_ivp  # takes a fifth of a second
+
         a = self.interpolate(self.A)
         size = self.A.shape[-1]
         result = solve_ivp(

@@ -57,7 +57,7 @@ _MECHANISM = '''"""The linkage {name}: {title}. Written from its description."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import cos, inf, pi, radians, sin
 from typing import ClassVar
 
 from linkwork import friction, planar
@@ -149,6 +149,7 @@ MECHANISM = Mechanism(
     links=(
 {links}
     ),
+    greatest_rotation={rotation},
     switch="{switch}",
 )
 '''
@@ -420,6 +421,7 @@ class Package:
             parts=indent_lines(parts, 12),
             paths="".join(f"{quote(name)}, " for name in self.picture.paths()),
             links=indent_lines(v.links(), 8),
+            rotation="radians(10.0)" if any(spring.law for spring in d.springs.values()) else "inf",
             switch="rough" if d.friction else "",
         )
 

@@ -42,7 +42,7 @@ from .records import (
     state_clearance,
 )
 from .sources import SOURCE, Source, find, hold, is_bar_unwound, is_bar_wound, write_channels
-from .stepping import EXPONENT, STAGES, Flow, attempt, interpolate, next_step_size, shorter_step_size
+from .stepping import EXPONENT, STAGES, Flow, attempt, bounded_step_size, interpolate, next_step_size, shorter_step_size
 
 #: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
 GREATEST_SHARE = 1e-3
@@ -134,11 +134,12 @@ def choose_first_size(motion):
 
 
 @inner
-def next_size(carry):
-    """Return the size of the next step, and whether it is the last of its interval."""
+def next_size(carry, rates, reach, lane, lanes):
+    """Return the size of the next step from a state with these rates, and whether it is the last of its interval."""
     remaining = (carry.stop - carry.begin) - carry.elapsed
-    last = carry.step >= remaining * (1.0 - 1e-10)
-    return remaining if last else min(carry.step, 0.5 * remaining), last
+    size = bounded_step_size(carry.step, rates, reach, lane, lanes)
+    last = size >= remaining * (1.0 - 1e-10)
+    return remaining if last else min(size, 0.5 * remaining), last
 
 
 @inner
@@ -256,7 +257,7 @@ def _cross_interval(motion, most):
             # after a rejected step the inputs are those of one of its stages
             renew(carry.elapsed, x, motion.u, motion)
             return RUNNING
-        h, last = next_size(carry)
+        h, last = next_size(carry, room.k[0], motion.problem.reach, 0, 1)
         t_new = carry.stop if last else carry.begin + (carry.elapsed + h)
         error = _attempt(h, motion)
         good, inside, clearance = False, False, 0.0

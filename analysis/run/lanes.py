@@ -264,7 +264,7 @@ def _choose_sizes(v, w):
                 read_lane(lane, LANES, v.z, w.room.k[0])
                 write_lane(lane, LANES, w.room.k[0], v.k[0])
                 choose_first_size(_motion(i, w))
-            v.h[lane], v.last[lane] = next_size(carry)
+            v.h[lane], v.last[lane] = next_size(carry, v.k[0], w.problem.reach, lane, LANES)
             carry.steps += 1
 
 

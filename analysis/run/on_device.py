@@ -35,7 +35,14 @@ def run_thread(i, table):
     if i >= status.shape[0] or status[i] != RUNNING or state.carries[i].steps >= most:
         return
     problem = Problem(
-        device.equations(), given.modes, given.commands, given.outputs, given.tolerance, given.hold, given.end
+        device.equations(),
+        given.modes,
+        given.commands,
+        given.outputs,
+        given.tolerance,
+        given.hold,
+        given.end,
+        given.reach,
     )
     room = Room(rooms.k[i], rooms.y[i], rooms.z[i], rooms.f[i], rooms.inside[i], rooms.outputs[i])
     motion = lane_motion(i, problem, source, batch, watch, samples, room, state)

@@ -324,6 +324,7 @@ def make_problem(encoded: Encoded, settings: Settings, switched: bool) -> Any:
         settings.tolerance,
         settings.hold,
         float(settings.times[-1]),
+        np.array(encoded.mechanism.reach),
     )
 
 

@@ -29,7 +29,8 @@ class Problem(NamedTuple):
     ``equations`` are the addresses of the equations, with the indices `equations.DERIVATIVE` to `equations.JUMP`. A row of
     ``commands``, shape (c, 3), has for a commanded rate the indices of its channel, of the component of the state that it
     prescribes, and of the channel of its derivative. ``outputs`` is the number of outputs. ``hold`` is the step (s) over which
-    inputs are held after they are sampled at the samples' times, 0 if they act continuously. ``end`` is the run's end (s).
+    inputs are held after they are sampled at the samples' times, 0 if they act continuously. ``end`` is the run's end (s), and
+    ``reach`` is `Mechanism.reach`.
     """
 
     equations: NDArray[np.int64]
@@ -39,6 +40,7 @@ class Problem(NamedTuple):
     tolerance: float
     hold: float
     end: float
+    reach: NDArray[np.float64]
 
 
 class Watch(NamedTuple):
@@ -147,7 +149,7 @@ class Motion(NamedTuple):
     u: NDArray[np.float64]
 
 
-PROBLEM = types.NamedTuple((ADDRESSES, VECTOR, PLACES, int64, float64, float64, float64), Problem)
+PROBLEM = types.NamedTuple((ADDRESSES, VECTOR, PLACES, int64, float64, float64, float64, VECTOR), Problem)
 WATCH = types.NamedTuple((MATRIX, ADDRESSES, VECTOR, MATRIX, ADDRESSES), Watch)
 CARRIES = from_dtype(CARRY)[::1]
 SAMPLES = types.NamedTuple((VECTOR, CUBE, CUBE), Samples)

@@ -90,6 +90,16 @@ def leading_error(n, x, y, k, h, scale, lane, lanes):
 
 
 @inner
+def bounded_step_size(h, rates, reach, lane, lanes):
+    """Return a step size, shortened so that no component of the state, at its rate, changes by more than its reach."""
+    for i in range(reach.shape[0]):
+        rate = abs(rates[i * lanes + lane])
+        if h * rate > reach[i]:
+            h = reach[i] / rate
+    return h
+
+
+@inner
 def shorter_step_size(h, error):
     """Return the step size to try after a step of size h was rejected; ``error`` is relative to the tolerance."""
     return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)

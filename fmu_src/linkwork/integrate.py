@@ -131,6 +131,7 @@ def integrate(
     tolerance: float,
     scale: Vector,
     step: float = 0.0,
+    reach: Vector = (),
     accept: Callable[[Vector], None] | None = None,
     max_steps: int = 20_000,
 ) -> Result:
@@ -152,6 +153,8 @@ def integrate(
         Magnitude of each component below which its error counts as absolute.
     step : float
         First step size to try, such as `Result.step` of the previous interval; if 0, the integrator chooses.
+    reach : tuple of float
+        Largest change of each component in a step, as far as its rate at the beginning of the step tells; any change if empty.
     accept : callable, optional
         Called with each accepted state, which is finite; may raise to stop the integration.
     max_steps : int
@@ -171,8 +174,9 @@ def integrate(
     proposal = step
     while True:
         remaining = duration - done
-        last = proposal >= remaining * (1.0 - 1e-10)
-        h = remaining if last else min(proposal, 0.5 * remaining) if proposal > 0.5 * remaining else proposal
+        size = bounded_step(proposal, k1, reach)
+        last = size >= remaining * (1.0 - 1e-10)
+        h = remaining if last else min(size, 0.5 * remaining)
         steps += 1
         if steps > max_steps:
             raise IntegrationError(
@@ -209,6 +213,14 @@ def integrate(
                 raise IntegrationError(
                     f"the step size fell to {proposal:.3g} s, {done:g} s into an interval of {duration:g} s"
                 )
+
+
+def bounded_step(step: float, rates: Vector, reach: Vector) -> float:
+    """Return a step size, shortened so that no component of the state, at its rate, changes by more than its ``reach``."""
+    for rate, most in zip(rates, reach):
+        if step * abs(rate) > most:
+            step = most / abs(rate)
+    return step
 
 
 def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from math import degrees, pi
+from math import degrees, inf, pi
 from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
@@ -314,6 +314,9 @@ class Mechanism:
         by arithmetic without branches.
     unjoined : UnjoinedMessages or None
         Messages of this AssemblyError, also used by the FMU in C; None if the links can always be joined.
+    greatest_rotation : float
+        Largest change of an angle among the freedoms in a step of the integrator (rad), so that no step passes over a force
+        that acts over a small angle only; infinite if there is no such force.
     switch : str
         Name of the only constant on which the equations may branch: they may differ between zero and positive values of this
         constant. The equations are traced once for each of the two cases, so that terms that are switched off cost nothing.
@@ -344,6 +347,7 @@ class Mechanism:
     check_assembly: Callable[[Sequence[float], Any], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     unjoined: UnjoinedMessages | None = None
+    greatest_rotation: float = inf
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
@@ -364,6 +368,12 @@ class Mechanism:
     def size(self) -> int:
         """Return the number of components of the state."""
         return 2 * len(self.freedoms) + 2
+
+    @cached_property
+    def reach(self) -> tuple[float, ...]:
+        """Return the largest change of each component of the state in a step of the integrator: see ``greatest_rotation``."""
+        angles = (self.greatest_rotation if freedom.period > 0.0 else inf for freedom in self.freedoms)
+        return (*angles, *[inf] * (len(self.freedoms) + 2))
 
     @property
     def first_set(self) -> PublishedSet:

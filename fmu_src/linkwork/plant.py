@@ -306,6 +306,7 @@ class Plant:
                 tolerance=self.tolerance,
                 scale=self._scale,
                 step=self._step_size,
+                reach=self.mechanism.reach,
                 accept=accept,
             )
         except LinkworkError as error:

@@ -338,6 +338,13 @@ static double first_step(const Plant *a, const double x[STATES], const double sl
     return ratio == 0.0 ? duration : fmin(duration, pow(a->tolerance, 1.0 / ORDER) / ratio);
 }
 
+/* The step, shortened so that no angle of a freedom, at its rate, turns by more than its reach. */
+static double bounded_step(double step, const double slope[STATES]) {
+    for (int i = 0; i < STATES; i++)
+        if (step * fabs(slope[i]) > reach[i]) step = reach[i] / fabs(slope[i]);
+    return step;
+}
+
 /* The longest part of a step h from x that stays clear of the limit of assembly: it is written to x. */
 static double up_to_limit(const Plant *a, double t, double x[STATES], double h, double k[]) {
     double low = 0.0, high = h, best[STATES], tried[STATES];
@@ -410,9 +417,9 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
     if (!all_finite(k, STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k, *duration);
     for (int steps = 1;; steps++) {
-        double remaining = *duration - done;
-        bool last = proposal >= remaining * (1.0 - 1e-10);
-        double h = last ? remaining : fmin(proposal, 0.5 * remaining);
+        double remaining = *duration - done, size = bounded_step(proposal, k);
+        bool last = size >= remaining * (1.0 - 1e-10);
+        double h = last ? remaining : fmin(size, 0.5 * remaining);
         if (steps > MAX_STEPS) {
             snprintf(cause, SENTENCE, "%d steps did not suffice: stopped %s s into an interval of %s s", MAX_STEPS,
                      digits(first, done), digits(second, *duration));

@@ -446,6 +446,18 @@ def test_stability_judges_the_motion_that_a_weak_motor_reaches(linkwork):
 
 
 @pytest.mark.slow
+def test_a_chart_of_another_motion_than_the_machine_reaches_is_noted(linkwork, tmp_path, monkeypatch):
+    monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
+    monkeypatch.setattr(charts, "LINES", (2, 2))
+    monkeypatch.setattr(charts, "SAMPLES", 12)
+    result = linkwork(
+        "stability", EXAMPLES / "capture.toml", "--x", "slider.stiffness", "--x-range", "7900", "8100",
+        "--y-range", "2", "4", "--points", "2", "--jobs", "1",
+    )  # fmt: skip
+    assert "follows a motion of amplitude 3.5693 mm, not the motion of 21.612 mm" in result.output
+
+
+@pytest.mark.slow
 def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, monkeypatch):
     monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
     monkeypatch.setattr(charts, "LINES", (2, 2))

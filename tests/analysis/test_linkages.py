@@ -39,7 +39,7 @@ from analysis.periodic import (
     search_orbits,
     steady_drive,
 )
-from analysis.run import Inputs, Trajectory, cosimulate, load_case, simulate
+from analysis.run import Inputs, Trajectory, cosimulate, load_case, simulate, simulate_many
 from analysis.tuning import Limit, Wish, tune
 from analysis.tuning.conditions import limited_value, sample_turn
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -1246,3 +1246,57 @@ def test_friction_of_a_microscopic_linkage_is_that_of_its_joint_forces() -> None
     spun.freedom("arm", "A", speed=1e4).mechanism()
     held = simulate("spun", stop_time="1 ms")["drive.applied_torque"]
     np.testing.assert_allclose(held, 1e-6 * 2e-12 * 1e4**2 * 20e-6, rtol=1e-6)
+
+
+#: Half the angle over which the punch below acts (rad), and the work that it takes (J).
+PUNCH = math.radians(3.0)
+WORK = 4e4 * (math.sin(PUNCH) - PUNCH * math.cos(PUNCH))
+ROLLING = {"wheel_angle": 1.0, "wheel_speed": 20.0}
+
+
+def punch() -> Any:
+    """A flywheel of 4 kg.m2 that a force slows down over six degrees of each turn."""
+    built = linkage("punch", ground={"A": (0, 0)}).body("wheel", points={"A": (0, 0)}, mass=30, inertia=4)
+    built.spring(
+        "load", at="A", law=f"2e4*max(cos(x - 0.5) - {math.cos(PUNCH)!r}, 0) + c*v", constants={"c": "0 N*m*s/rad"}
+    )
+    return built.freedom("wheel", "A", driven=True).mechanism()
+
+
+def run_plant(mechanism: Any, _: Path) -> tuple[float, float]:
+    plant = Plant(mechanism, mechanism.first_set.parameters, mechanism.initial(**ROLLING), drive_mode=0)
+    plant.step(0.0, 0.7)
+    return plant.state[0], plant.state[1]
+
+
+def run_alone(mechanism: Any, _: Path) -> tuple[float, float]:
+    run = simulate(mechanism.name, Inputs(torque=0.0), initial=ROLLING, stop_time=0.7, step=0.7)
+    return run["wheel.angle"][-1], run["wheel.speed"][-1]
+
+
+def run_many(mechanism: Any, _: Path) -> tuple[float, float]:
+    runs = simulate_many(
+        [mechanism.first_set.parameters] * 9, Inputs(torque=0.0), initial=ROLLING, stop_time=0.7, step=0.7
+    )
+    return runs[8]["wheel.angle"][-1], runs[8]["wheel.speed"][-1]
+
+
+def run_native(mechanism: Any, folder: Path) -> tuple[float, float]:
+    file = build_native(mechanism, NATIVE, folder)
+    run = cosimulate(file, mechanism.first_set.parameters, Inputs(torque=0.0), initial=ROLLING, stop_time=0.7, step=0.7)
+    return run["wheel.angle"][-1], run["wheel.speed"][-1]
+
+
+@pytest.mark.parametrize(
+    "run", [run_plant, run_alone, run_many, pytest.param(run_native, marks=[pytest.mark.slow, pytest.mark.fmu])]
+)
+def test_no_step_passes_over_a_force_that_acts_over_a_few_degrees(run: Callable[..., Any], tmp_path: Path) -> None:
+    angle, speed = run(punch(), tmp_path)
+    assert angle // (2.0 * math.pi) == 2
+    assert 20.0 - speed == pytest.approx(20.0 - math.sqrt(20.0**2 - 2.0 * 2.0 * WORK / 4.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("find", [newton_orbit, lambda p, drive, **o: search_orbits(p, drive, **o).orbits[0]])
+def test_a_periodic_motion_meets_a_force_that_acts_over_a_few_degrees(find: Callable[..., Any]) -> None:
+    orbit = find(variant(punch().name, load_c=0.05), Drive(torque=1.0), start=[12.0])
+    assert orbit.turn()["wheel.speed"].mean() == pytest.approx((1.0 - WORK / (2.0 * math.pi)) / 0.05, rel=1e-3)

@@ -134,7 +134,7 @@ static bool across(double from, double to, double z[], const double scale[], int
     static double k[STAGES * LENGTH];
     double result[LENGTH], done = 0.0, whole = to - from;
     for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
-        double h = fmin(*proposal, whole - done);
+        double h = fmin(fmin(*proposal, reach[CRANK < 0 ? 0 : CRANK]), whole - done);
         bool last = h >= whole - done;
         if (!slope(NULL, from + done, z, k, length)) return false;
         double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;

@@ -173,6 +173,7 @@ class OperatingPoint:
             along,
             tolerance,
             self.flow.torque,
+            self.flow.longest_step(self.vector),
         )
 
     def shoot(

@@ -278,6 +278,10 @@ class Flow:
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
+    def longest_step(self, drive: NDArray[np.float64]) -> float:
+        """Return the greatest step of the integrator (rad of the crank): see `Mechanism.greatest_rotation`."""
+        return self.mechanism.greatest_rotation / max([1.0, *map(abs, self._ratios(drive).values())])
+
     def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return y, shape (..., n), from states of a run, shape (..., states), and the drive vector."""
         y = states[..., self.places]

@@ -82,17 +82,21 @@ class Section(NamedTuple):
     along: float  # typical magnitude of lambda
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
+    longest: float  # greatest step (rad)
 
 
-SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
+SECTION = types.NamedTuple(
+    (int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean, float64), Section
+)
 
 
 @part
 def replace_numbers(section, drive, p, scale, tolerance):
     """Return the section with new drive vector, constants p, scale and tolerance, and with 1 for the magnitude of lambda."""
     return Section(
-        section.equations, section.modes, drive, p, scale, section.angle_periods, 1.0, tolerance, section.torque
-    )
+        section.equations, section.modes, drive, p, scale, section.angle_periods, 1.0, tolerance, section.torque,
+        section.longest,
+    )  # fmt: skip
 
 
 @inner
@@ -155,8 +159,9 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
     proposed = carry[0]
     while True:
         # avoid a tiny last step before the end
-        last = angle + 1.001 * proposed >= end
-        h = end - angle if last else proposed
+        size = min(proposed, section.longest)
+        last = angle + 1.001 * size >= end
+        h = end - angle if last else size
         error = attempt(flow, 0.0, angle, h, z, room, section.drive, -1, None) / section.tolerance
         carry[1] += 1.0
         if error <= 1.0:

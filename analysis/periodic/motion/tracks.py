@@ -183,8 +183,8 @@ def advance_tracks(section, v):
             if v.status[lane] == RUNNING:
                 running = True
                 # avoid a tiny last step before the end
-                rest = v.end[lane] - v.angle[lane]
-                v.h[lane] = rest if 1.001 * v.step[lane] >= rest else v.step[lane]
+                rest, size = v.end[lane] - v.angle[lane], min(v.step[lane], section.longest)
+                v.h[lane] = rest if 1.001 * size >= rest else size
         if not running:
             return False
         _attempt(section, v)
