@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import reduce
+from dataclasses import dataclass
+from functools import cached_property, reduce
 from math import pi
 from typing import Any
 
@@ -212,7 +212,7 @@ def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
     return mean * angle + wave - wave[0], way * mean
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicOrbit(NotebookResult):
     """A periodic motion of the full nonlinear mechanism.
 
@@ -249,8 +249,6 @@ class PeriodicOrbit(NotebookResult):
     stations: Stations | None = None
     others: int | None = None
     least_clearance: float | None = None
-    # cached values of `point`, `scale`, `multipliers` and `amplitudes`
-    _kept: dict[str, Any] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.monodromy).all():
@@ -269,24 +267,20 @@ class PeriodicOrbit(NotebookResult):
         others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
-    @property
+    @cached_property
     def point(self) -> OperatingPoint:
         """The mechanism and its drive as arrays for the kernels."""
-        if "point" not in self._kept:
-            self._kept["point"] = operating_point(self.parameters, self.drive)
-        return self._kept["point"]
+        return operating_point(self.parameters, self.drive)
 
     @property
     def flow(self) -> Flow:
         """The mechanism with its drive as a flow, which has the names and units of y."""
         return self.point.flow
 
-    @property
+    @cached_property
     def scale(self) -> FloatArray:
         """Scale of each component of y, its typical magnitude, shape (n,): see `motion_scales`."""
-        if "scale" not in self._kept:
-            self._kept["scale"] = self.point.scale(self.start)
-        return self._kept["scale"]
+        return self.point.scale(self.start)
 
     @property
     def periods(self) -> int:
@@ -316,12 +310,10 @@ class PeriodicOrbit(NotebookResult):
         flow = self.flow
         return tuple((flow.labels[n], flow.components[n][1]) for n in range(flow.swing_count))
 
-    @property
+    @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, the largest modulus first, shape (n,)."""
-        if "multipliers" not in self._kept:
-            self._kept["multipliers"] = multipliers(self.monodromy)
-        return self._kept["multipliers"]
+        return multipliers(self.monodromy)
 
     def distance(self, start: FloatArray) -> float:
         """Return the greatest difference of a start y from that of this orbit, relative to the scale, without whole turns."""
@@ -392,13 +384,11 @@ class PeriodicOrbit(NotebookResult):
         """Half the range of the first free coordinate over a period, such as a slider position (m)."""
         return float(self.amplitudes[0])
 
-    @property
+    @cached_property
     def amplitudes(self) -> FloatArray:
         """Half the range of each free coordinate over a period, in the order of `swings`; see `Turn.amplitudes`."""
-        if "amplitudes" not in self._kept:
-            names = [name for name, _ in self.flow.components[: self.flow.swing_count]]
-            self._kept["amplitudes"] = self.resolved_turn(names).amplitudes
-        return self._kept["amplitudes"]
+        names = [name for name, _ in self.flow.components[: self.flow.swing_count]]
+        return self.resolved_turn(names).amplitudes
 
     def clearance(self, samples: int = SAMPLES) -> float:
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""
@@ -438,7 +428,7 @@ class PeriodicOrbit(NotebookResult):
 def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
     """Build a `PeriodicOrbit` that stores its operating point; ``rest`` are the other fields."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
-    orbit._kept["point"] = point
+    orbit.__dict__["point"] = point
     return orbit
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import product
 from math import degrees, inf, pi
 from threading import Lock
@@ -284,7 +284,6 @@ class Polisher:
         self.normal, self.limits, self.pivot = normal, limits, pivot
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
-        self._refinement: Refinement | None = None
         self._programs: dict[tuple[str, bool, bool], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False, judged: bool = False) -> Program:
@@ -405,12 +404,10 @@ class Polisher:
             return unchanged
         return program.settle_extremes(found, solve)
 
-    @property
+    @cached_property
     def refinement(self) -> Refinement:
-        """Return the refinement of an untimed path; the first call builds it."""
-        if self._refinement is None:
-            self._refinement = Refinement(self.program("curve", exact=True))
-        return self._refinement
+        """Return the refinement of an untimed path."""
+        return Refinement(self.program("curve", exact=True))
 
     def judge_start(self, start: Start) -> Answer:
         """Evaluate a start without optimising it; return an answer that says whether it meets every constraint and bound."""
