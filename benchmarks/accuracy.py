@@ -1,7 +1,5 @@
 """Compare the times of solvers at equal accuracy: each solver runs at its loosest setting that reaches the accuracy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from time import process_time
 from typing import NamedTuple

@@ -8,8 +8,6 @@ coordinate is the integral of the speed. Each master runs in a process of its ow
 docs/fmu.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Callable

@@ -10,8 +10,6 @@ greatest error of all connected outputs over the run. For the other masters, whi
 speed at the end of the run. The tables are printed; the plots go into the folder ``--out``.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Sequence

@@ -10,8 +10,6 @@ with a simplex. `analysis.synthesis.evaluate` measures the results of both searc
 constraint.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import count

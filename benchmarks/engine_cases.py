@@ -4,8 +4,6 @@ Accuracy is the largest error of the slider position at the sample times, relati
 reference is the solution of `linkwork`'s reduced equations at a tolerance of 1e-13.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from math import ceil, cos, inf, isfinite, pi, sin

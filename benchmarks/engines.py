@@ -8,8 +8,6 @@ This needs Exudyn 1.13 or later and MuJoCo 3.7 or later, whose ``connect`` const
 this term the model is of no use: the error of u in MuJoCo 3.6 is 70 %.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import sys

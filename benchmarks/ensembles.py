@@ -8,8 +8,6 @@ samples of 1 ms, and 0.1 s. They are compared with the same runs alone, and with
 ratios are of processor time, so that they hold on a busy machine; the wall-clock speed-up of two threads needs two free cores.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 from collections.abc import Callable, Iterator, Sequence

@@ -11,8 +11,6 @@ installation carries, and with them.
 Each measurement is a process of its own. Times are wall-clock times and processor times; other programs change the latter less.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

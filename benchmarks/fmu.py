@@ -8,8 +8,6 @@ number is the best of several runs. The evaluations of the right-hand side in a 
 own at the states at which the steps evaluate them.
 """
 
-from __future__ import annotations
-
 import importlib
 import subprocess
 import sysconfig

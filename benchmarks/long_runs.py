@@ -11,8 +11,6 @@ Except in the table ``times`` both mechanisms run freely, without damping, drive
 Residuals are relative to the kinetic energy at the start.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence

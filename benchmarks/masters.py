@@ -7,8 +7,6 @@ Each run is a process of its own, on Linux. `tests/fmu/spy.c` takes the place of
 it on to that library. `docs/generate.py` puts the table into docs/masters.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

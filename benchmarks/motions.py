@@ -8,8 +8,6 @@ a damper of 2 N.s/m at a number of speeds from 1120 to 2640 rpm. The mechanism r
 then repeats after one to four turns, Newton's method confirms this motion, and `search_orbits` must have found it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from dataclasses import fields, replace

@@ -8,8 +8,6 @@ in the first picture to the compiled integration at the accuracy of `benchmarks.
 time is the least of several, measured in one process. Engines that are not installed (extra ``bench``) are left out and named.
 """
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterable
 from functools import partial

@@ -15,8 +15,6 @@ The results have a row for each target and search: the least error after each of
 satisfies the constraints. The file is rewritten after every row. A run that is stopped keeps its rows; the next run continues.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress

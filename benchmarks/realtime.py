@@ -7,8 +7,6 @@ number of seconds: each step begins at its scheduled time and must end before th
 normal priority and, where `chrt` is permitted, with real-time priority. The same system is also timed in the Python master.
 """
 
-from __future__ import annotations
-
 import argparse
 import platform
 import re

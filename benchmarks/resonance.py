@@ -8,8 +8,6 @@ parts are then run in this process, one after the other. All times are processor
 changes them.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import subprocess

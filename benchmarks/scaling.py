@@ -7,8 +7,6 @@ cost of distributing the work even on a busy machine. Each time is the best of s
 compared bit by bit.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from contextlib import nullcontext

@@ -8,8 +8,6 @@ gets its best method and the loosest setting whose error is at most 1e-6. Times 
 times in this one process. MuJoCo and Exudyn (extra ``bench``) are left out, with a note, if they are not installed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

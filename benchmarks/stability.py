@@ -11,8 +11,6 @@ differences of these motions replace the variational equations. Chart and pieces
 With --cores 1 processor time is measured instead of elapsed time; it hardly depends on other programs.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

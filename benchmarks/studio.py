@@ -9,8 +9,6 @@ page keeps up is seen from the processor time of its own thread for each frame (
 browser's trace), and from the number of late frames.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

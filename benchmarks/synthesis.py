@@ -12,8 +12,6 @@ Three tables, all in one run:
    squares, IPOPT) and with the simplex.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

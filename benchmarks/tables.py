@@ -1,7 +1,5 @@
 """Read and write the tables of results, and format them for the pages."""
 
-from __future__ import annotations
-
 import csv
 import os
 from collections.abc import Iterable, Sequence

@@ -8,8 +8,6 @@ from the random seeds 1 to 9; the last two functions come from the seeds 1 and 2
 result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi, radians, tau

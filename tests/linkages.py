@@ -1,7 +1,5 @@
 """Planar linkages and a target for the tests: a fixed linkage, and random linkages with general values of all dimensions."""
 
-from __future__ import annotations
-
 from math import cos, hypot, pi, sqrt
 
 import numpy as np

@@ -5,8 +5,6 @@ Tyne. Numbers are in cgs units, as printed, with the unit in the name; the facto
 Nothing here is an output of this program.
 """
 
-from __future__ import annotations
-
 from types import MappingProxyType
 from typing import Mapping, NamedTuple
 

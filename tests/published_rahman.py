@@ -6,8 +6,6 @@ shift are therefore from an independent derivation of the closed form, with the 
 seconds and degrees, as printed; the factors to SI are at the top. Nothing here is an output of this program.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple

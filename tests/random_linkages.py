@@ -1,7 +1,5 @@
 """Generate random planar linkages: chains of dyads of all kinds, made from given positions so that they can be assembled."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Run programs, and load the scripts of docs/, which is not a package, as modules."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 from collections.abc import Mapping

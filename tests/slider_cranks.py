@@ -5,8 +5,6 @@ from a seed; `cases` is a hypothesis strategy that shrinks. The rod's length is 
 both at the drawn state and where the groove puts the crank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, hypot, pi, sin, sqrt
 from typing import NamedTuple

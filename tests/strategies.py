@@ -5,8 +5,6 @@ is a hypothesis strategy that shrinks. No case is rejected, because each is buil
 freedoms, then the transmission angle, then the lengths of coupler and rocker that have this angle.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from dataclasses import replace

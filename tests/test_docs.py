@@ -1,7 +1,5 @@
 """The documentation repeats the code where it says so, and its code runs."""
 
-from __future__ import annotations
-
 import base64
 import json
 import pkgutil

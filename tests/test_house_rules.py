@@ -1,7 +1,5 @@
 """Rules for all code of the package: which modules write files, and how functions are called."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

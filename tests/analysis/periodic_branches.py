@@ -1,7 +1,5 @@
 """Make branches from formulas, without computing motions, for tests of reading and drawing branches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """Stable parts of branches, jumps at folds, and the ranges to avoid, on curves known by formulas."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

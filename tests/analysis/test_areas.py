@@ -2,8 +2,6 @@
 `test_published_synthesis`.
 """
 
-from __future__ import annotations
-
 from math import cos, pi, sin
 
 import numpy as np

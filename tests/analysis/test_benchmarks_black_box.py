@@ -1,7 +1,5 @@
 """Differential evolution and the downhill simplex: their quality function against the exact one, and their first simplex."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import radians
 

@@ -1,7 +1,5 @@
 """Work and precision (`benchmarks.precision`): its pictures, and that lanes cost less."""
 
-from __future__ import annotations
-
 from analysis.numerics.vectors import LANES
 from benchmarks import precision
 from benchmarks.precision import ACCURACY, OURS, Point

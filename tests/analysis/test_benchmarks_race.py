@@ -1,7 +1,5 @@
 """The race of `benchmarks.race`: its targets, curves and scores, its results, and how they are counted."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
 from math import inf, nan, radians

@@ -1,7 +1,5 @@
 """Branches of periodic motions: special points against what defines them, switching, and how a branch ends."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Parameter and case files: units, errors that name what is wrong, every digit kept."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import fields, replace
 from math import pi, radians

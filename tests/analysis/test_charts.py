@@ -1,7 +1,5 @@
 """A stability chart as a whole: what it finds, tells, writes, and does where something is missing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`linkwork new`: what is written runs as it is, holds every entry there is, and its examples are taken."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from math import pi

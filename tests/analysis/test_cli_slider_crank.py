@@ -1,7 +1,5 @@
 """`linkwork slider-crank`: what it prints and writes, its exit codes, and what it says of wrong input."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from dataclasses import replace

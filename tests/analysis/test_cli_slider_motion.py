@@ -1,7 +1,5 @@
 """`linkwork slider-motion`: its case files, what it writes, says and refuses, and that what it writes runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi, radians
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`linkwork synthesize`, and the case files it reads."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

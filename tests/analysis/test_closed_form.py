@@ -1,7 +1,5 @@
 """Synthesis in closed form: guidance through poses, precision points of a function, cognates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 from math import pi, radians, sqrt

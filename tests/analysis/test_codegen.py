@@ -1,7 +1,5 @@
 """Machine code of the equations, kernels that call it, and the cache that keeps kernels for the next process."""
 
-from __future__ import annotations
-
 import errno
 import io
 import math

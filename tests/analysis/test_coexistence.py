@@ -1,7 +1,5 @@
 """Coexisting motions over a plane, and which of them a start ends in."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Periods by Gauss collocation against the integrator: neighbours along a branch, and rows of orbits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from pathlib import Path

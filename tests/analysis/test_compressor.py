@@ -1,7 +1,5 @@
 """A compressor driven by a force law at its crank pin: one freedom, a torque of zero, and friction from its joint forces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Friction in guide and pins by their forces, in runs, ensembles and periodic motions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 

@@ -1,7 +1,5 @@
 """Folds and period doublings followed through a plane of two parameters."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Damping and natural frequency from a decaying record, against the exact motion of a mass on a spring."""
 
-from __future__ import annotations
-
 from math import exp, pi, sqrt
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The five-bar slider and the planar slider-crank in words: what the hand-written ones are, at little more cost."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

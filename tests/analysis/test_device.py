@@ -1,7 +1,5 @@
 """Ensembles on a graphics processor: the kernel's code compiled for this processor, and for a device where there is one."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import subprocess

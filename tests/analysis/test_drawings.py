@@ -1,7 +1,5 @@
 """Drawings to scale: DXF and SVG, read back by other libraries."""
 
-from __future__ import annotations
-
 import re
 import sys
 from io import StringIO

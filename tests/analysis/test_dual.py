@@ -1,7 +1,5 @@
 """Dual numbers: derivatives against known ones and differences, the algebra's laws, screws against rigid motions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ensembles: many runs at once, in lanes or one after the other, are the runs by themselves, on any number of cores."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

@@ -1,7 +1,5 @@
 """Events: the torsion bar's release, an output that crosses a level, a function that crosses zero, runs that stop."""
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 from dataclasses import replace

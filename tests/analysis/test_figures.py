@@ -1,7 +1,5 @@
 """Plots, drawings and animation: that they show what they should, and refuse what they cannot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Quantities with units, the reader of tables, CSV files and arrays."""
 
-from __future__ import annotations
-
 import csv
 import doctest
 import os

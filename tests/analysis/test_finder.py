@@ -1,7 +1,5 @@
 """All periodic motions at a point: what single guesses missed, and that two methods and the sum of indices agree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 

@@ -1,7 +1,5 @@
 """Fourier series of real functions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

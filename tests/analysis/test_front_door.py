@@ -1,7 +1,5 @@
 """What `analysis` offers at its top: names, examples that run, quantities as text, published sets."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import pickle

@@ -1,7 +1,5 @@
 """Every reader with rubbish: it returns something or raises one sentence, soon, and never another exception."""
 
-from __future__ import annotations
-
 import copy
 import json
 import time

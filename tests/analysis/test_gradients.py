@@ -1,7 +1,5 @@
 """Gradients of motions and of their special points against differences of what is found anew at other parameters."""
 
-from __future__ import annotations
-
 import doctest
 from collections.abc import Callable
 from dataclasses import replace

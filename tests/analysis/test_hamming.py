@@ -1,7 +1,5 @@
 """Hamming's method: its formulas, its order, its error control, and its manners as a SciPy method."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from math import cos, pi, sin

@@ -1,7 +1,5 @@
 """Harmonic balance: thesis's two harmonics, any order, the nonlinear plant; against runs, differences and each other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

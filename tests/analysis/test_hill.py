@@ -1,7 +1,5 @@
 """Linear equations with periodic coefficients: three ways to their stability, and verdicts on it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi, sqrt
 

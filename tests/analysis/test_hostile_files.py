@@ -1,7 +1,5 @@
 """Files that are damaged, endless or meant to harm: a sentence, and nothing left behind, lost or executed."""
 
-from __future__ import annotations
-
 import errno
 import gzip
 import json

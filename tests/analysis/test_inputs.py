@@ -1,7 +1,5 @@
 """Inputs: what each signal is worth at a time, on which side of a jump, and what is refused."""
 
-from __future__ import annotations
-
 from math import cos, inf, nan, pi, sin
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Inverse dynamics against forward runs of the plant, the redundant formulation, closed forms and invariants."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, sin
 

@@ -1,7 +1,5 @@
 """Elementary functions of vectors of doubles against mpmath, and each lane alone."""
 
-from __future__ import annotations
-
 import math
 from math import inf, nan, pi
 from typing import Any

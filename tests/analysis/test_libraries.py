@@ -1,7 +1,5 @@
 """Dependencies: what the core alone can do, what is said where a library is missing, and that all imports are declared."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

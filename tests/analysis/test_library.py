@@ -1,7 +1,5 @@
 """The library of described linkages in examples/linkages: each against multipliers, by its energy, and what it is known for."""
 
-from __future__ import annotations
-
 import cmath
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Dead centres, toggles, time ratio and mechanical advantage against the linkage's own motion."""
 
-from __future__ import annotations
-
 from math import acos, cos, pi, radians, sqrt
 from typing import Any
 

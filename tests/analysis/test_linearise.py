@@ -1,7 +1,5 @@
 """Linear models: against complex steps of the plain functions, small nonlinear motions, and Floquet theory."""
 
-from __future__ import annotations
-
 import cmath
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """A linkage in the plane: against the plant, dense sampling, brute-force circuits, and bars integrated numerically."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, sin
 

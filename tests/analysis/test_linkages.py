@@ -1,7 +1,5 @@
 """Described linkages: against multipliers in all coordinates, against the hand-written five-bar, energy, files, mistakes."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import itertools

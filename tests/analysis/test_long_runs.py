@@ -1,7 +1,5 @@
 """Late times, many turns, and the energy that a free mechanism keeps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 

@@ -1,7 +1,5 @@
 """Masses from the sections of links: held against integrals over the bodies, and their origins."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, pi
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Adding a mechanism is adding a folder and one line: two of the tests' own, of two freedoms and of one, through everything."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Natural frequencies about the equilibrium, against closed forms and the energy of machines with several springs."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Normal forms: of maps whose coefficients are known, and of branches against runs beside the special points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import permutations
 from math import sqrt

@@ -1,7 +1,5 @@
 """Periodic motions by shooting: against published numbers, SciPy on the plain equations, and balances over a period."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 

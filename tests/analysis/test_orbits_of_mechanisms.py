@@ -1,7 +1,5 @@
 """Periodic motions of mechanisms other than the five-bar: closed forms, SciPy on other equations, and long runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, pi, sin

@@ -1,7 +1,5 @@
 """Special points of branches against other continuation codes, AUTO-07p and jaxcont: what they gave, and now give."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

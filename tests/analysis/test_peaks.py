@@ -1,7 +1,5 @@
 """The own short form of SciPy's `find_peaks`, whose import takes longer than a response, against SciPy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import find_peaks

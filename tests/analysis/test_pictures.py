@@ -1,7 +1,5 @@
 """Pictures of responses, charts and basins: what is drawn is what was computed, by Matplotlib and in pages."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Pin forces in the synthesis: the traced plant and its compiled run against Lagrange multipliers, bounds and objective."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, hypot, pi, radians, sin
 from pathlib import Path

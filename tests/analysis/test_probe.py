@@ -1,7 +1,5 @@
 """The probe finds what was planted in an FMU, says how to see it again, and finds nothing in the same FMU without the fault."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """The nonlinear program: its optima by finite differences, every kind of constraint in its results, least squares beside it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

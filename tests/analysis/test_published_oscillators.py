@@ -1,7 +1,5 @@
 """Periodic motions of the textbooks' oscillators: Mathieu, Duffing, the driven pendulum, against tables and other methods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 

@@ -4,8 +4,6 @@ What a linkage traces is worked out here from the thesis's formula by intersecti
 kinematics.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from math import degrees, pi, radians

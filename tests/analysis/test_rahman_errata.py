@@ -1,7 +1,5 @@
 """Errors in Rahman's equations, each against another formulation; what they do to his statements is tested beside these."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin
 
 import numpy as np

@@ -1,7 +1,5 @@
 """FMUs of random linkages: the Python one is the plant to the last bit, the native one to its tolerance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

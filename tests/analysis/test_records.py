@@ -1,7 +1,5 @@
 """Records: none can be changed or given an attribute of another name, and most take their fields by name alone."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Iterator

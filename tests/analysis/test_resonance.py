@@ -1,7 +1,5 @@
 """Response over the speed: against the reference numbers, long runs, and the statements of the thesis."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

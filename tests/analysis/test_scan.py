@@ -1,7 +1,5 @@
 """The global scan: its projections against direct evaluation, and known linkages recovered."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import log, pi
 

@@ -1,7 +1,5 @@
 """Masses and moments of inertia of sections, held against numerical integration of density over the body."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Responses of a mechanism with two free coordinates, each a linear oscillator with an unbalance: closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, pi, sqrt
 from pathlib import Path

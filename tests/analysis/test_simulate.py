@@ -1,7 +1,5 @@
 """The in-process solver: one motion by every method, the reference numbers, accuracy, sampling, and how a run ends."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """Slider-force control: designs against what defines them, loops against their linear prediction and the FMU."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from math import inf, pi

@@ -1,7 +1,5 @@
 """Loop closure by dual matrices: against the closed form, on the residual, in any unit, and what it says when it fails."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise, product
 from math import cos, hypot, inf, nan, pi, sin

@@ -1,7 +1,5 @@
 """The thesis's method mended, by dual vectors: against the plant's vector mechanics, published numbers and balances."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from math import inf, nan, radians

@@ -1,7 +1,5 @@
 """The figure of tolerances draws what it is given, in the units it says, and says what a reader must know."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import erf, pi, radians, sqrt, tau
 from typing import Any

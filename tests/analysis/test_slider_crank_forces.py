@@ -4,8 +4,6 @@ The truth is the plant's scalar functions, the thesis's dual vectors (another fo
 numbers.
 """
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from math import degrees, pi, radians, tau

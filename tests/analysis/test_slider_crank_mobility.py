@@ -1,7 +1,5 @@
 """Mobility of the slider-crank: against the closed forms, against dense scans, and against known numbers."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Pictures of the slider-crank: what is drawn is where the plant has it, to one scale, and can be read."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from math import cos, degrees, pi, radians

@@ -1,7 +1,5 @@
 """Runs of the slider-crank by the in-process solver: every way of driving it, by independent integrators, and its balances."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, sin
 from typing import Any

@@ -1,7 +1,5 @@
 """Limit positions and pin forces of slider-cranks: against positions by differences, and the equations of the spatial plant."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, pi, radians
 from pathlib import Path

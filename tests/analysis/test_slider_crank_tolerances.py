@@ -4,8 +4,6 @@ The truth is differences of `force_turn` on changed mechanisms, and distribution
 are known.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import erf, pi, radians, sqrt, tau
 from typing import Any

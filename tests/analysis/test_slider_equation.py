@@ -1,7 +1,5 @@
 """The linearised slider equation: published coefficients, Taylor orders, general mechanisms against differences and runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi, radians
 from typing import Any

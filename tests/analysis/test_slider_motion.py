@@ -1,7 +1,5 @@
 """The direct search for the slider's motion: against brute force, the compiled kernels, and the thesis's problems."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from math import pi, radians

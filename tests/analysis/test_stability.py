@@ -1,7 +1,5 @@
 """Stability of the periodic motion: charts, removing damping, grids, long runs."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from dataclasses import replace

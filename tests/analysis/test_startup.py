@@ -1,7 +1,5 @@
 """What starting costs: the package, its figures and the command import nothing heavy before it is used."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

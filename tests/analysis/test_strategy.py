@@ -1,7 +1,5 @@
 """The simplest mechanism that meets a tolerance: where it stops, and what it says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import degrees, inf, radians
 from typing import Any

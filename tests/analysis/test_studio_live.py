@@ -1,7 +1,5 @@
 """What the studio computes beside the mechanism: response, stability, a motor, powers; its numbers against Python's."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace

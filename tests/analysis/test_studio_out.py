@@ -1,7 +1,5 @@
 """The studio: what is taken out of it and put behind it, views, touch, readers of the screen, and the sources of the page."""
 
-from __future__ import annotations
-
 import functools
 import http.server
 import os

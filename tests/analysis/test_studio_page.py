@@ -1,7 +1,5 @@
 """The studio's page in a browser: what it says in every state, how its charts and controls look, what a fault leaves."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

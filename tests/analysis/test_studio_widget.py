@@ -1,7 +1,5 @@
 """The studio as a widget: its state in Python, and in a host that does what a notebook does for anywidget."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

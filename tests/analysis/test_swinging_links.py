@@ -1,7 +1,5 @@
 """Linkages that start elsewhere than at zero, or have a link that swings: a pendulum on a yoke, by Mathieu's equation."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from math import pi

@@ -1,7 +1,5 @@
 """The plant's functions traced with CasADi: the same code objects, their globals bound to its sin, cos and so on."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from types import ModuleType

@@ -1,7 +1,5 @@
 """A ranking shows one of several mirror images and near copies; these are counted, and nothing is lost."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a designer sees of a solution: plots, drawing, table, report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, cos, degrees, hypot, pi, radians, sin
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The compiled path of the coupler point and its derivatives: against the plant traced with CasADi, and finite differences."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import pi
 from typing import Any

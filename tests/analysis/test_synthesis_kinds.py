@@ -2,8 +2,6 @@
 form, and searches that find again what is known.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, pi, radians, sqrt
 from typing import Any

@@ -1,7 +1,5 @@
 """The measures between whole curves as functions to descend by, and what they find: corners, guesses, the greatest error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise

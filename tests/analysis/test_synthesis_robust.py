@@ -1,7 +1,5 @@
 """Targets that the methods were not made for: from the literature, noisy, scaled, moved, and such as no four-bar can trace."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from math import pi

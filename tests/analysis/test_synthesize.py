@@ -1,7 +1,5 @@
 """`synthesize` as a whole: determinism, sensitivities and rounding, trade-offs, precision points, bad input."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Targets: curves and functions of the crank angle, from arrays, formulas and files."""
 
-from __future__ import annotations
-
 from math import pi
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tracking of a slider motion: feed-forward, feedback, both, on plants that are and are not the model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi
 

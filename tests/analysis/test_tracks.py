@@ -1,7 +1,5 @@
 """Periods integrated in lanes against the same one by one, and vectors in kernels against NumPy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from typing import Any

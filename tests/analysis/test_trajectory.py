@@ -1,7 +1,5 @@
 """The result of a run: columns by name, files, data frames, plots."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

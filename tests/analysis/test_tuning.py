@@ -1,7 +1,5 @@
 """Tuning: the least change after which a range of speeds is as it was wished, against independent searches for it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import pi

@@ -1,7 +1,5 @@
 """The thesis's two rotations in a ball joint: where the loop stays open, by all eighteen equations and by its own six."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import asin, degrees, radians
 

@@ -4,8 +4,6 @@ At commanded speeds the cart is a linear oscillator under two harmonic forces, s
 known in closed form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from math import pi, sqrt

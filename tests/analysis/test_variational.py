@@ -1,7 +1,5 @@
 """The variational optimum of the slider's motion: against brute force through the plant's kinematics, and as geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Work over threads, processes and clusters: the same numbers, whatever happens to the workers."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

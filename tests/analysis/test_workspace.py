@@ -1,7 +1,5 @@
 """Coupler curves and the accessible area: against analytic cases, and against configurations that go forwards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, inf, nan, pi
 

@@ -1,7 +1,5 @@
 """Slips in Youssef's text and programs that no study needs, each with its size; docs/youssef.md lists them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, radians, sin
 

@@ -1,7 +1,5 @@
 """The table of work and precision: it is that of the program, and a looser tolerance costs less and errs more."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Bad input gets an answer in one sentence, and nothing is lost: neither the process nor the last good state."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """The FMU runs on a Python with nothing installed, and on older and newer ones than that of the tests."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

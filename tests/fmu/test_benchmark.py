@@ -1,7 +1,5 @@
 """The benchmark of the FMUs runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Building: what is in the archive, which GUID it bears, and how a failure is reported."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

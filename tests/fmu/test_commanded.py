@@ -1,7 +1,5 @@
 """The table of masters that follow a commanded speed is what runs of them find."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

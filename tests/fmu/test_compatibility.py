@@ -1,7 +1,5 @@
 """What is published with an FMU, in the form that fmi-standard.org asks for."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """FMUs as WebAssembly components: the interface of FMI-LS-WASM, the native FMU's numbers, its refusals and its saved states."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from zipfile import ZipFile
 

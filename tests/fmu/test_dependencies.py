@@ -1,7 +1,5 @@
 """The dependencies that the model description declares are those that the FMU has."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree.ElementTree import Element
 

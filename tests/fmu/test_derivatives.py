@@ -1,7 +1,5 @@
 """Derivatives that the native FMUs give, against CasADi's Jacobians and against differences."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from ctypes import c_double, c_int32, c_size_t, c_uint32
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The model description is the contract, variable by variable, and says what masters need to know."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Iterator

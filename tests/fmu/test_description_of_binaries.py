@@ -1,7 +1,5 @@
 """What the description of a native FMU states is what its library does."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from ctypes import c_double
 from itertools import product

@@ -1,7 +1,5 @@
 """The experiments that every FMU carries, and running those of any FMU."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from math import cos, sqrt
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where a Python FMU can be unpacked, and the calls from which its guard keeps PythonFMU's library."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

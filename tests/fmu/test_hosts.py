@@ -1,7 +1,5 @@
 """Native FMUs in a host without Python: where they are unpacked, what the address of their resources is, many at once."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The variables of native FMUs: what they add to the mechanism's, the states with their derivatives, what depends on what."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product

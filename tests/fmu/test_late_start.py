@@ -1,7 +1,5 @@
 """FMUs of every kind whose run begins at 1e9 s: that from zero, as well as times are resolved there."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ A master that cannot be imported is skipped, unless the environment variable LIN
 the whole project is checked.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -4,8 +4,6 @@ Every line and every branch of the shell is reached, or it says here why it is n
 no undefined behaviour is found on the way.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

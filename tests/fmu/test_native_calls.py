@@ -3,8 +3,6 @@
 The tables say what FMI 2.0.4 (3.2.3 and 4.2.4) and FMI 3.0.2 (2.3, 3.2 and 4.2) allow.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Runs of the native FMUs call by call: what is refused and in which words, saved states, events, intermediate updates."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import math

@@ -1,7 +1,5 @@
 """What native FMUs compute at the start is traced of the mechanism's own functions, or the build says what cannot be traced."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 What the plant does is tested in `tests/plant`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

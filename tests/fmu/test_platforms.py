@@ -4,8 +4,6 @@ emulator. Those of macOS are inspected only.
 The emulators are Wine for Windows (Debian: wine64) and QEMU for 64-bit ARM (qemu-user-static, libc6-arm64-cross).
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

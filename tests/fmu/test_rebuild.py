@@ -1,7 +1,5 @@
 """The same bytes for everyone: builds by two users, the bill of materials, and building again from an FMU's own sources."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

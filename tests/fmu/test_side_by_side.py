@@ -1,7 +1,5 @@
 """FMUs that share a process, and with it one Python interpreter, each run on their own equations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

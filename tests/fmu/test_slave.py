@@ -1,7 +1,5 @@
 """The slave class by itself, without the wrapper: what it says to the one who holds it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The sources of native FMUs in one program: both mechanisms and both standards, each behind its prefix."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A saved state is the whole state: restored, in this process or another, the run goes on bit for bit."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An FMU that does not run does not count as built."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

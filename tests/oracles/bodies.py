@@ -6,8 +6,6 @@ motion of its three bodies in space, the pins' accelerations and the drives make
 accelerations, forces and moments at once: a formulation that shares no algebra with `linkwork.slider_crank.dynamics`.
 """
 
-from __future__ import annotations
-
 import cmath
 from math import cos, sin, sqrt, tanh
 from typing import Any, NamedTuple

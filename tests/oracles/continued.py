@@ -9,8 +9,6 @@ branch begins at a motion to which SciPy's integrator has settled: no code of th
 prints what `tests.published.CONTINUED` contains. The codes are installed with the extra ``continuation``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from math import pi

@@ -1,7 +1,5 @@
 """A graphics processor that is none: CuPy's functions, with the kernel compiled for this processor from the same code."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Derivatives by central differences of order 6."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

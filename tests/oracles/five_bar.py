@@ -3,8 +3,6 @@
 All angles are absolute, so that the rocker's th4 is the thesis's theta4 + alpha.
 """
 
-from __future__ import annotations
-
 import math
 from cmath import exp, phase
 from functools import lru_cache

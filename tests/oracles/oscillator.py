@@ -11,8 +11,6 @@ motion, v and parameter are solved for together. The series of the map, for the 
 with x as a polynomial in the deviations at the start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Neither `linkwork.planar` nor the structure analysis is used. Each body has a pl
 constraint equations; accelerations and joint forces follow from one linear system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise

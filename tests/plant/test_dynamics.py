@@ -4,8 +4,6 @@ The five-bar also stands against its redundant form with Lagrange multipliers. W
 `test_slider_crank_dynamics`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, pi, radians, sin, tanh

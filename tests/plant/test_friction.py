@@ -1,7 +1,5 @@
 """Friction in guide and pins of the five-bar: against multipliers, textbook cases, energy, the limit of jamming."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import fields, replace
 from math import hypot, pi, sqrt, tanh

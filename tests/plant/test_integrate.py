@@ -1,7 +1,5 @@
 """The integrator: its order, its error control, and how it ends, carries on and gives up."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, exp, isfinite, sin, sqrt
 

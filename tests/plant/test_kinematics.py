@@ -1,7 +1,5 @@
 """Kinematics: the loop closes, on both assemblies, and every rate is the derivative of its position."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import atan2, cos, hypot, pi, radians, sin, sqrt
 

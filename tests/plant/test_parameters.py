@@ -1,7 +1,5 @@
 """Parameters: what is refused and what is said, the derived constants, and the published sets against their tables."""
 
-from __future__ import annotations
-
 from dataclasses import MISSING, FrozenInstanceError, asdict, fields, replace
 from math import cos, hypot, inf, nan, pi, radians, sin
 from typing import Any, Mapping, NamedTuple

@@ -3,8 +3,6 @@
 Pins, lines and the arms of the bodies themselves all move with one coordinate, as they do where a dyad is part of a body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import atan2, cos, sin
 from typing import Any

@@ -3,8 +3,6 @@
 Tests of what every plant does run over the mechanisms and their drives; what is special of one comes at the end.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from math import asin, cos, degrees, hypot, inf, isfinite, nan, pi, radians, sin, sqrt

@@ -1,8 +1,6 @@
 """Dynamics of the slider-crank, what is special of it: Newton and Euler on each body in space, the groove, and the thesis's
 relations and numbers. What it shares is in `test_dynamics`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, radians

@@ -1,7 +1,5 @@
 """Kinematics of the slider-crank: the loop closes, on both assemblies, and every rate is the derivative of its position."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, cos, hypot, pi, sin, sqrt
 

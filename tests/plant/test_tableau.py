@@ -1,7 +1,5 @@
 """The Runge-Kutta tableau proves itself: every order condition it must meet, up to order 8."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from itertools import combinations_with_replacement

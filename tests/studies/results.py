@@ -1,7 +1,5 @@
 """Compute the results of the studies once for all their tests, and check what must be true of each study."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from pathlib import Path

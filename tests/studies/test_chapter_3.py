@@ -1,7 +1,5 @@
 """The figures of chapter III: drift, steady motion, launches, free motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The figures of chapter IV: the linearised equation and its resonances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

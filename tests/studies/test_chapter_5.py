@@ -1,7 +1,5 @@
 """The figures of chapter V: regions of instability."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

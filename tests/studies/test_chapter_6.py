@@ -1,7 +1,5 @@
 """The figures of chapter VI: synthesis of four-bars; the quality functions of the thesis."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

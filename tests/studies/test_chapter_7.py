@@ -1,7 +1,5 @@
 """The motions of the slider of chapter VII: the errors that are to be reached, recomputed by the plant's own kinematics."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import atan2, cos, pi, sin
 

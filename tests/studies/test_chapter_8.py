@@ -1,7 +1,5 @@
 """The figures of chapter VIII, on rigs 1 and 2: the orbits against runs, what friction does, and the page on rig 2."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """The conclusions of Youssef's thesis, sections 8.0 and 9.1."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rahman's figures 5 to 38 and what his text states, in pounds and inches, apart from what the studies do."""
 
-from __future__ import annotations
-
 import csv
 from functools import cache
 from math import cos, sin

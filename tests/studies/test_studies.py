@@ -1,7 +1,5 @@
 """The list of studies, how one is made, and what a verdict says."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

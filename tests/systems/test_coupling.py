@@ -1,7 +1,5 @@
 """Systems in co-simulation against their equations joined to one model, and that model against an independent formulation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi
 from pathlib import Path

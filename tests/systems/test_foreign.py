@@ -1,7 +1,5 @@
 """FMUs of other tools as parts of a system."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

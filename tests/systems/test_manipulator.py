@@ -1,7 +1,5 @@
 """A published benchmark of co-simulation: a planar arm that a hydraulic cylinder moves, against its published motion."""
 
-from __future__ import annotations
-
 from math import sqrt
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Many runs of a system: the same as one by one, kept, continued, and lived through by the loss of a worker."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import inf

@@ -1,7 +1,5 @@
 """Other masters run an archive of SSP, or its FMUs by their own wiring, to where ours comes; each in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys

@@ -1,7 +1,5 @@
 """Partners and controllers, each against an answer in closed form."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields
 from math import exp, inf, nan, pi, sqrt

@@ -1,7 +1,5 @@
 """A system as one C program: the numbers of the Python master, no heap, times and deadlines."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What is wired wrongly gets one sentence, what is perhaps not meant a note; files of SSP come back as they were."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable
