@@ -140,18 +140,25 @@ class JoinedSystem:
         ``symbols`` stand for the connected outputs of mechanisms; ``values`` are the expressions of these outputs, which may
         contain ``symbols``.
         """
-        if not symbols:
-            return casadi.SX(0, 1)
-        w, found = casadi.vertcat(*symbols), casadi.vertcat(*values)
-        for _ in symbols:
-            found = casadi.substitute(found, w, found) if casadi.depends_on(found, w) else found
-            if not casadi.depends_on(found, w):
-                return found
-        found = casadi.vertcat(*values)
-        matrix = casadi.jacobian(found - w, w)
-        if casadi.depends_on(matrix, w):
-            raise WiringError("an algebraic loop of the system is not linear: it cannot be joined to one model")
-        return -casadi.solve(matrix, casadi.substitute(found - w, w, casadi.SX.zeros(len(symbols))))
+        found, unknown = list(values), list(range(len(symbols)))
+        while unknown:
+            loop = casadi.vertcat(*(symbols[n] for n in unknown))
+            known = [n for n in unknown if not casadi.depends_on(found[n], loop)]
+            if not known:
+                break
+            unknown = [n for n in unknown if n not in known]
+            solved = (casadi.vertcat(*(which[n] for n in known)) for which in (symbols, found))
+            for n, value in zip(unknown, casadi.substitute([found[n] for n in unknown], *([each] for each in solved))):
+                found[n] = value
+        if unknown:
+            values = casadi.vertcat(*(found[n] for n in unknown)) - loop
+            matrix = casadi.jacobian(values, loop)
+            if casadi.depends_on(matrix, loop):
+                raise WiringError("an algebraic loop of the system is not linear: it cannot be joined to one model")
+            solution = -casadi.solve(matrix, casadi.substitute(values, loop, casadi.SX.zeros(len(unknown))))
+            for n, value in zip(unknown, casadi.vertsplit(solution)):
+                found[n] = value
+        return casadi.vertcat(casadi.SX(0, 1), *found)
 
     def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
         """Integrate the system with SciPy's DOP853, and return all outputs at multiples of ``step`` (s).

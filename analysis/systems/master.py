@@ -39,6 +39,8 @@ _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
 #: Decay per step of the power to which residuals are compared: this power remembers some fifty steps, so that instants
 #: without power do not matter.
 _MEMORY = 0.98
+#: Largest number of rounds in which the values of algebraic loops may settle at the start.
+_ROUNDS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,10 +146,7 @@ class _Instances:
             }
             for instance in self.instances.values():
                 instance.start_initialisation()
-            # outputs that depend directly on inputs settle after as many rounds as there are parts
-            for _ in self.instances:
-                self.outputs = self._read()
-                self._exchange(self.outputs)
+            self._settle()
             for instance in self.instances.values():
                 instance.finish_initialisation()
         except BaseException as error:
@@ -181,6 +180,21 @@ class _Instances:
         self.bonds = np.array(numbers, dtype=int).reshape(-1, 4).T
         self.outputs = self.before = self._read()
         self.last = 1.0
+
+    def _settle(self) -> None:
+        """Exchange outputs until they no longer change: without algebraic loops for as many rounds as there are parts, at most.
+
+        In a loop that does not settle the values of as many rounds stay.
+        """
+        self.outputs, changes, turn = self._read(), [inf], len(self.instances)
+        while len(changes) <= _ROUNDS and changes[-1] > 0.0:
+            self._exchange(self.outputs)
+            before, self.outputs = self.outputs, self._read()
+            changes.append(float(np.max(np.abs(self.outputs - before), initial=0.0)))
+            # a change goes round a loop in as many rounds as there are parts, at most
+            if len(changes) > turn + 1 and not changes[-1] < changes[-1 - turn]:
+                break
+        self._exchange(self.outputs)
 
     def _read(self) -> Floats:
         return np.concatenate([instance.read() for instance in self.instances.values()])

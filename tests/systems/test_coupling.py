@@ -297,3 +297,26 @@ def test_a_torsional_spring_of_two_bodies_swings_as_two_rotors_do() -> None:
     states = [scipy.linalg.expm(matrix * t) @ (np.array([0.0, 0.0, 3.0, 0.0]) - rest) + rest for t in run.time]
     np.testing.assert_allclose(run["left.angle"], [s[0] for s in states], atol=1e-8)
     np.testing.assert_allclose(run["shaft.exerted_torque"], [k * (s[1] - s[0] - rest[1]) for s in states], atol=1e-6)
+
+
+def test_an_algebraic_loop_is_settled_at_the_start_and_joined_to_one_model() -> None:
+    """A wheel on a spring, and a load that it drives: torque against acceleration, and not linear in the speed."""
+    wheel = linkage("loop-wheel", ground={"A": (0, 0)}).body(
+        "wheel", points={"A": (0, 0)}, mass="1 kg", inertia="0.05 kg*m^2"
+    )
+    wheel.spring("k", at="A", stiffness="30 N*m/rad").freedom("wheel", "A", start="0.2 rad").mechanism()
+    load = linkage("loop-load", ground={"A": (0, 0)}).body(
+        "load", points={"A": (0, 0)}, mass="1 kg", inertia="0.02 kg*m^2"
+    )
+    load.spring("fan", at="A", law="0.01*v**3").freedom("load", "A").mechanism()
+    wires = {
+        End("wheel", "drive.torque"): End("load", "drive.applied_torque"),
+        End("load", "drive.speed"): End("wheel", "wheel.speed"),
+        End("load", "drive.acceleration"): End("wheel", "wheel.acceleration"),
+    }
+    system = System(
+        parts={"wheel": PartTable(case="loop-wheel"), "load": PartTable(case="loop-load")}, connections=wires
+    )
+    for run in (run_system(system.wiring(), stop_time=2e-3), JoinedSystem(system).run(2e-3, 1e-3)):
+        # the torque of the load acts with the sign of its drive: the inertias subtract
+        assert run["wheel.wheel.acceleration"][0] == pytest.approx(-30.0 * 0.2 / (0.05 - 0.02), rel=1e-12)
