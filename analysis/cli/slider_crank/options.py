@@ -248,13 +248,7 @@ _MECHANISM_OPTIONS = (
         help="S1 = groove.amplitude sin(groove.ratio theta1), produced by a groove in the crank's shaft, as in the FMU, or by "
         "a device apart from the crank, as in the thesis.",
     ),
-    click.option(
-        "--set",
-        "settings",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="Change a parameter by its name in the FMU, such as rod.length='45 in' or assembly.branch=-1.",
-    ),
+    common.set_option("rod.length='45 in' or assembly.branch=-1"),
     click.option(
         "-u",
         "--units",

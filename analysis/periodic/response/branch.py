@@ -284,8 +284,7 @@ def switch(
     begun = replace(
         orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
     )
-    follower = _follower(family, begun, settings)
-    follower.scale[:-1] *= motion_sizes([orbit])
+    follower = _follower(family, begun, settings, sizes=motion_sizes([orbit]))
     # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy - (-1.0) ** (times - 1) * np.eye(len(scale))) * scale / scale[:, None]
@@ -348,10 +347,14 @@ def _settings(low: float, high: float, greatest: float, most_points: int) -> Set
 
 
 def _follower(
-    family: Family, orbit: PeriodicOrbit, settings: Settings, angles: NDArray[np.float64] | None = None
+    family: Family,
+    orbit: PeriodicOrbit,
+    settings: Settings,
+    angles: NDArray[np.float64] | None = None,
+    sizes: NDArray[np.float64] | float = 1.0,
 ) -> Follower:
     equations = OrbitEquations(family, orbit.turns, settings.low, settings.high, angles)
-    return Follower(equations, equations.scale(orbit.start), settings)
+    return Follower(equations, equations.scale(orbit.start) * sizes, settings)
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
