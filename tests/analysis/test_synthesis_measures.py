@@ -109,6 +109,18 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
         assert slope == pytest.approx(0.5e6 * (ends[0] - ends[1]), rel=1e-3, abs=1e-6)
 
 
+def test_a_curve_that_goes_on_beyond_the_path_is_off_by_that() -> None:
+    at = np.linspace(0.0, 1.0, 400)
+    path = syn.TargetPath(points=BASE.path(at), closed=False)
+    beyond = float(np.hypot(*(BASE.path([1.3]) - path.points[-1]).T)[0])
+    made = syn.Solution.from_linkage(syn.UntimedPath(path=path, objective="worst"), BASE, 1.3 * at)
+    assert made.evaluation.worst == made.value == pytest.approx(beyond, rel=1e-3)
+    assert syn.quality_cells(made)[2] == f"{1e3 * made.value:.4g}"
+    weighted = syn.UntimedPath(path=path, weights=np.linspace(1.0, 2.0, 400))
+    assert [syn.quality_name(task).split()[0] for task in (made.task, weighted)] == ["area", "weighted"]
+    assert syn.Solution.from_linkage(weighted, BASE, 1.3 * at).evaluation.worst < 0.01 * beyond
+
+
 def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     """By the unknowns, the last of which is the bound."""
     known = drawn(np.random.default_rng(2), least=0.7)

@@ -365,9 +365,9 @@ def error_unit(task: Task) -> tuple[float, str]:
 
 def quality_name(task: Task) -> str:
     """Return the name of a task's quality function."""
-    if isinstance(task, UntimedPath) and task.measure == "area":
-        return "area between the curves"
     weighted = not np.all(np.asarray(getattr(task, "weights", 1.0)) == 1.0)
+    if isinstance(task, UntimedPath) and task.measure == "area":
+        return f"{'weighted ' if weighted else ''}area between the curves"
     what = "errors of angle" if isinstance(task, RockerFunction) else "errors"
     return f"sum of {'weighted ' if weighted else ''}squared {what}"
 

@@ -55,6 +55,8 @@ class Evaluation:
         Crank rotations at which the linkage is compared with the targets; None for a closed path without given rotations.
     length : float
         For a motion, the length by which an angular error is multiplied to count as an error of position (m); see `Motion`.
+    hausdorff : float or None
+        For an untimed path with the objective "worst", its Hausdorff distance from the coupler curve (m).
     """
 
     error: float
@@ -63,6 +65,7 @@ class Evaluation:
     angle_errors: FloatArray | None
     rotation: FloatArray | None
     length: float = 0.0
+    hausdorff: float | None = None
 
     @property
     def combined_errors(self) -> FloatArray:
@@ -78,8 +81,8 @@ class Evaluation:
 
     @property
     def worst(self) -> float:
-        """Return the largest of the combined errors (m or rad)."""
-        return float(self.combined_errors.max())
+        """Return the largest of the combined errors (m or rad), or `hausdorff`, which counts the curve beyond the path, too."""
+        return float(self.combined_errors.max()) if self.hausdorff is None else self.hausdorff
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
@@ -158,8 +161,11 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
         back = half_lengths(steps, path.closed) * curve_distance(points, curve, closed=path.closed)
         error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
-    value = error if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
-    return Evaluation(error=error, value=value, errors=distance, angle_errors=None, rotation=rotation)
+    farthest = None if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
+    value = error if farthest is None else farthest
+    return Evaluation(
+        error=error, value=value, errors=distance, angle_errors=None, rotation=rotation, hausdorff=farthest
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
