@@ -545,6 +545,10 @@ def _print_regions(found: Any) -> None:
     if found.beside is not None:
         several = int((found.beside.stable > 1).sum())
         sentences.append(f"at {several} of {found.beside.stable.size} points several stable motions were found")
+        if unsure := int((found.beside.index != found.beside.index_of_all).sum()):
+            sentences.append(
+                f"at {unsure} points one more motion must exist, unless it is lost at the limit of assembly"
+            )
     elif found.most > 1:
         sentences.append(
             f"up to {found.most} stable motions were found at one point of the lines searched: --coexisting shows where"

@@ -156,6 +156,28 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
         np.testing.assert_array_equal(*(np.ma.filled(getattr(found, name, 0), np.nan) for found in (last, alone)))
 
 
+def test_a_motion_missing_at_a_point_is_sought_from_those_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compute = coexistences._compute_motions
+
+    def losing(*arguments: Any) -> Any:
+        made = compute(*arguments)
+        made[0, 1, 1] = np.nan  # the unstable motion of the middle point
+        made[0, 1, 1:] = made[0, 1, [*range(2, made.shape[2]), 1]]
+        return made
+
+    monkeypatch.setattr(coexistences, "_compute_motions", losing)
+    monkeypatch.setattr(coexistences, "_TOGETHER", 1)
+    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
+    found = coexistence(operation, [0.99 * SPEED, SPEED, 1.01 * SPEED], [11.0], folder=tmp_path)
+    assert found.count.tolist() == [[3, 3, 3]]
+    assert found.index.tolist() == [[1, 1, 1]]
+    alone = find_orbits(replace(RIG_1_B, slider_damping=11.0), speed=SPEED)
+    assert found.amplitude[0, 1].compressed() == pytest.approx([o.amplitude for o in alone.orbits], rel=1e-4)
+    assert found.largest[0, 1].compressed() == pytest.approx([o.largest for o in alone.orbits], rel=1e-4)
+
+
 def test_no_stable_motion_is_a_sentence() -> None:
     doubled = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.5)
     with pytest.raises(InputError, match="no stable motion"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,10 @@ from ...files import Whole, unknown_name, write_csv
 from ...mechanisms import Parameters, find_mechanism
 from ...run import takes_published
 from ...units import Amount, pair
-from ..motion.discretisation import OperatingPoint, operating_point
-from ..motion.drive import Drive, assembly_ranges
+from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
+from ..motion.drive import SAME, Drive, assembly_ranges
 from ..motion.flow import GAP, IN_LANES, PLAIN, TOLERANCE, VARIATIONAL, Flow, multipliers
-from ..motion.orbit import PeriodicOrbit, require_turns
+from ..motion.orbit import PeriodicOrbit, newton_orbit, require_turns
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
@@ -62,6 +62,10 @@ class Coexistence:
         Half the range of the first free coordinate, such as a slider position (m).
     starts : ndarray, shape (ny, nx, k, n)
         y at crank angle 0; NaN after the last motion.
+    index : ndarray of int, shape (ny, nx)
+        Sum of the indices of the motions: see `Orbits.index`.
+    index_of_all : int
+        Value of ``index`` if no motion is missing, unless motions are lost at the limit of assembly.
     swing : (str, str)
         Name and unit of the coordinate whose amplitude is given.
     computed : int
@@ -73,6 +77,8 @@ class Coexistence:
     largest: np.ma.MaskedArray[Any, np.dtype[np.float64]]
     amplitude: np.ma.MaskedArray[Any, np.dtype[np.float64]]
     starts: FloatArray
+    index: NDArray[np.int64]
+    index_of_all: int
     swing: tuple[str, str]
     computed: int
 
@@ -114,6 +120,7 @@ class Coexistence:
             "stable motions found": self.stable.ravel().astype(float),
             "amplitude of the smallest stable motion": self.least.filled(np.nan).ravel(),
             "amplitude of the largest stable motion": self.greatest.filled(np.nan).ravel(),
+            "sum of the indices": self.index.ravel().astype(float),
         }
         return write_csv(path, columns)
 
@@ -132,9 +139,10 @@ def coexistence(
     """Find all periodic motions of one turn at every point of a grid over two parameters.
 
     Newton's method starts from the motions of the neighbouring point in the row, then from `STARTS` guesses, with the known
-    motions divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches a single
-    point closely. An undriven link that has a ratio in the drive goes round in all these motions; any other undriven link only
-    swings. `find_orbits` finds motions of both kinds. The rows are distributed over workers and kept as in `grid`.
+    motions divided out. Where the indices of the motions do not add up, the motions of the points around are tried, too. A
+    motion that exists only in a short part of a row may still be missed; `find_orbits` searches a point closely. An undriven
+    link that has a ratio in the drive goes round in all these motions; any other undriven link only swings. `find_orbits` finds
+    motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------
@@ -163,14 +171,18 @@ def coexistence(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
-        (len(xs), MOST_ORBITS, guesses.shape[1] + 2),
+        (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
     )
+    whole = 0 if rows[0].flow.angle_periods.any() else 1
+    _seek_from_neighbours(operation, xs, ys, data, whole)
     return Coexistence(
         x=xs,
         y=ys,
         largest=np.ma.masked_invalid(data[..., 0]),
         amplitude=np.ma.masked_invalid(data[..., 1]),
-        starts=data[..., 2:],
+        starts=data[..., 3:],
+        index=_indices(data),
+        index_of_all=whole,
         swing=rows[0].flow.components[0],
         computed=computed,
     )
@@ -179,8 +191,8 @@ def coexistence(
 def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArray:
     """Compute the motions at the m points of each row, shape (rows, m, MOST_ORBITS, n + 2).
 
-    The last axis has the largest multiplier, the amplitude and the start. The motions of a point are sorted by amplitude;
-    entries after the last motion are NaN.
+    The last axis has the largest multiplier, the amplitude, the index and the start. The motions of a point are sorted by
+    amplitude; entries after the last motion are NaN.
     """
     first, m = rows[0], rows[0].scales.shape[0]
     if any((row.flow, row.switched) != (first.flow, first.switched) for row in rows):
@@ -193,16 +205,65 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
     angles = np.linspace(0.0, first.flow.period, SAMPLES, endpoint=False)
     points = Points(*map(np.vstack, zip(*[row.points() for row in rows])))
     kernels.solve_all(section, points, first.search(), m, angles, guesses, Motions(starts, monodromies, swings, counts))
-    largest = np.full((count, MOST_ORBITS), np.nan)
+    largest, index = np.full((2, count, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
-    largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
+    of = monodromies[found].reshape(-1, n, n)
+    largest[found] = np.abs(multipliers(of))[:, 0]
+    index[found] = np.sign(np.linalg.det(np.eye(n) - of))
     # evaluate the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
     fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan
-    whole = np.concatenate([largest[..., None], amplitude[..., None], starts], axis=2)
-    return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, n + 2)
+    whole = np.concatenate([largest[..., None], amplitude[..., None], index[..., None], starts], axis=2)
+    return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, n + 3)
+
+
+def _indices(data: FloatArray) -> NDArray[np.int64]:
+    """Return the sum of the indices of the motions at each point; ``data`` are the rows by `_compute_motions`."""
+    return np.nansum(data[..., 2], axis=2).astype(np.int64)
+
+
+def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data: FloatArray, whole: int) -> None:
+    """Add motions to points whose indices do not add up to ``whole``, sought from the motions of the points around them.
+
+    A point around must have more motions, or indices that add up; those are tried that are nearest to no known motion.
+    """
+    # points whose motions have not been tried at the points beside them
+    fresh = np.ones(data.shape[:2], dtype=bool)
+    while fresh.any():
+        tried, fresh = fresh, np.zeros_like(fresh)
+        index, counts = _indices(data), np.isfinite(data[..., 0]).sum(axis=2)
+        for j, i in zip(*np.nonzero(index != whole)):
+            point = operating_point(*operation(float(xs[i]), float(ys[j])))
+            for row, column in product((j - 1, j, j + 1), (i - 1, i, i + 1)):
+                if not (0 <= row < len(ys) and 0 <= column < len(xs) and tried[row, column]):
+                    continue
+                if counts[row, column] and (counts[row, column] > counts[j, i] or index[row, column] == whole):
+                    starts = data[row, column, : counts[row, column], 3:]
+                    fresh[j, i] |= _add_motions(point, starts, data[j, i], whole)
+
+
+def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, whole: int) -> bool:
+    """Add motions to those of a point, sought from starts beside its own, until the indices add up to ``whole``.
+
+    Return whether a motion was added. ``into`` is the point's part of the result of `_compute_motions`.
+    """
+    count = before = int(np.isfinite(into[:, 0]).sum())
+    away = np.abs(point.flow.remove_turns(into[:count, None, 3:] - starts) / point.scale(into[0, 3:])).max(axis=2)
+    for start in np.delete(starts, away.argmin(axis=1), axis=0):
+        if count == MOST_ORBITS or int(np.nansum(into[:, 2])) == whole:
+            break
+        try:
+            orbit = newton_orbit(point.parameters, point.drive, start=start, settle=False)
+        except OrbitError:
+            continue
+        if all(orbit.distance(known) > SAME for known in into[:count, 3:]):
+            index = np.sign(np.linalg.det(np.eye(len(start)) - orbit.monodromy))
+            into[count] = orbit.largest, orbit.amplitude, index, *orbit.start
+            count += 1
+    into[:count] = into[np.argsort(into[:count, 1], kind="stable")]
+    return count > before
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
