@@ -149,10 +149,7 @@ class BlackBox:
             self.low, self.high = np.append(self.low, SPAN), np.append(self.high, 2.0 * pi)
 
     def quality(self, x: FloatArray) -> FloatArray:
-        """Return the sum of weighted squared errors at the stations, or the greatest weighted error if the task asks for it.
-
-        The result has the shape (m,); lengths are in units of the normal form.
-        """
+        """Return the sum of weighted squared errors at the stations, shape (m,), with lengths in units of the normal form."""
         q = self._linkages(x)
         return self._errors(q, self._rotations(x, q))
 
@@ -229,20 +226,13 @@ class BlackBox:
     def _errors(self, q: FloatArray, rotation: FloatArray) -> FloatArray:
         normal = self.normal
         coupler, rocker = self._directions(q, rotation)
-        squares: FloatArray = np.zeros(rotation.shape)
         if normal.points is not None:
-            squares = np.abs(self._coupler_points(q, rotation, coupler) - normal.points) ** 2
-        if normal.angle is not None:
-            squares = squares + self._angle_errors(q, rotation, coupler, rocker, normal.angle) ** 2
-        weighted = squares * normal.weights
-        return np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
-
-    def _angle_errors(
-        self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
-    ) -> FloatArray:
-        """Return the errors of the rocker or coupler angle, converted to lengths; a stretched link counts by its direction."""
-        own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
-        return self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
+            errors = np.abs(self._coupler_points(q, rotation, coupler) - normal.points)
+        else:
+            # a stretched link counts by its direction
+            assert normal.angle is not None
+            errors = normal.leverage * np.angle(rocker * np.exp(1j * (q[:, 10, None] - normal.angle)))
+        return (errors**2 * normal.weights).sum(axis=1)
 
     def _rotations(self, x: FloatArray, q: FloatArray) -> FloatArray:
         """Return the crank rotations at the stations, shape (m, n)."""

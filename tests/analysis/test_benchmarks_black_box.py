@@ -48,17 +48,15 @@ class TestQuality:
     def tasks(self) -> dict[str, syn.Task]:
         linkage, phi = self.KNOWN, np.linspace(0.0, 4.0, 7)
         points = linkage.path(phi) + 0.05 * np.random.default_rng(0).normal(size=(7, 2))
-        angle = linkage.coupler_angle(phi) + 0.1 * np.sin(phi)
         weights = np.linspace(1.0, 2.0, 7)
         return {
             "timed": syn.TimedPath(points=points, rotation=phi, weights=weights),
-            "motion": syn.Motion(points=points, angle=angle, rotation=phi, weights=weights),
             "rocker": syn.RockerFunction(
                 angle=linkage.rocker_angle(phi) + 0.1 * phi, rotation=phi, mounting=True, weights=weights
             ),
         }
 
-    @pytest.mark.parametrize("kind", ["timed", "motion", "rocker"])
+    @pytest.mark.parametrize("kind", ["timed", "rocker"])
     def test_timed_it_is_that_of_the_exact_kernels(self, kind: str) -> None:
         black = box(self.tasks()[kind])
         # of a rocker function the ground link is given
