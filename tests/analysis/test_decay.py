@@ -216,21 +216,21 @@ class TestCommand:
         assert code in (1, 2)
         assert words in " ".join(output.split())
 
-    def test_an_angle_and_its_moment_of_inertia(self) -> None:
+    @pytest.mark.parametrize(
+        ("factor", "header", "options"),
+        [(np.degrees(1.0), "t,a [deg]", ("--mass", "0.6 kg*m^2")), (1e3, "", ("--unit", "mm", "--mass", "0.6"))],
+    )
+    def test_friction_has_the_unit_of_a_force_or_a_moment(
+        self, factor: float, header: str, options: tuple[str, ...]
+    ) -> None:
         t = np.linspace(0.0, 0.8, 4001)
-        np.savetxt(
-            "record.csv",
-            np.column_stack([t, np.degrees(free(t, 4.0, 1.0))]),
-            "%g",
-            ",",
-            header="t,a [deg]",
-            comments="",
-        )
-        code, output = self.run("record.csv", "--mass", "0.6 kg*m^2", "--friction", "--no-plot")
+        record = np.column_stack([t, factor * free(t, 4.0, 1.0)])
+        np.savetxt("record.csv", record, delimiter=",", header=header, comments="")
+        code, output = self.run("record.csv", "--friction", "--no-plot", *options)
         assert code == 0, output
         (line,) = (line for line in output.splitlines() if "dry friction  " in line)
         assert float(line.split("│")[2]) == pytest.approx(1.0, rel=0.02)
-        assert "N.m.s/rad" in output
+        assert ("N.m.s/rad" in output) == bool(header)
 
     def test_friction_that_was_not_fitted_is_said(self) -> None:
         t = np.linspace(0.0, 0.8, 4001)
@@ -238,14 +238,6 @@ class TestCommand:
             np.savetxt("record.csv", np.column_stack([t, free(t, 4.0, friction)]), delimiter=",")
             _, output = self.run("record.csv", "--no-plot")
             assert ("as with dry friction" in output) == bool(friction)
-
-    def test_friction_in_newtons(self) -> None:
-        t = np.linspace(0.0, 0.8, 4001)
-        np.savetxt("record.csv", np.column_stack([t, 1e3 * free(t, 4.0, 1.0)]), delimiter=",")
-        code, output = self.run("record.csv", "--unit", "mm", "--mass", "0.6", "--friction", "--no-plot")
-        assert code == 0, output
-        (line,) = (line for line in output.splitlines() if "dry friction  " in line)
-        assert float(line.split("│")[2]) == pytest.approx(1.0, rel=0.02)
 
     @pytest.mark.parametrize(
         ("options", "words"),
