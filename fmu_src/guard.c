@@ -491,7 +491,6 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real step, fmi
 }
 
 CALL(CancelStep, (fmi2Component component), true)
-CALL(GetStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Status *value), value, kind, value)
 CALL(GetIntegerStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value), value, kind, value)
 CALL(GetStringStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2String *value), value, kind, value)
 
@@ -503,5 +502,6 @@ CALL(GetStringStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2S
         *value = found;                                                                                                        \
         return fmi2OK;                                                                                                         \
     }
+STATUS(GetStatus, fmi2Status, fmi2DoStepStatus, c->refused ? fmi2Discard : fmi2OK)
 STATUS(GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->time)
 STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, c->refused)

@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 
 from ..numerics.cache import code_folder, store_file
 from .ssp import STEP
-from .wiring import BASE, REAL, End, Part, Port, Wiring, WiringError
+from .wiring import BASE, End, Part, Port, Wiring, WiringError
 
 _TRANSFORMATIONS = tuple(
     f"{kind}Transformation" for kind in ("Linear", *(f"{k}Mapping" for k in ("Boolean", "Integer", "Enumeration")))
@@ -300,8 +300,6 @@ def _number(part: Part, key: str, given: Given) -> float:
         value = _convert(value, part, key, given.unit, given.base)
     if change is not None:
         value = value * float(change.get("factor", 1.0)) + float(change.get("offset", 0.0))
-    if port.type not in REAL and value != int(value):
-        raise WiringError(f"{name} starts with {value:g}: it must be a whole number")
     return value
 
 

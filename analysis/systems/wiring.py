@@ -93,7 +93,8 @@ class Part:
         InputError
             If the file is no FMU.
         WiringError
-            If the FMU is not for co-simulation with FMI 2.0 or 3.0, or a name in ``values`` is no parameter or input of it.
+            If the FMU is not for co-simulation with FMI 2.0 or 3.0, a name in ``values`` is no parameter or input of it, or a
+            value is not of the type of its variable.
         """
         check_fmu(fmu)
         description = read_description(fmu)
@@ -120,6 +121,11 @@ class Part:
         for known in values:
             if known not in settable:
                 raise unknown_name(known, settable, f"parameter or input {known} of {name}")
+            kind, value = ports[known].type, values[known]
+            if kind in ("String", "Binary", "Clock"):
+                raise WiringError(f"{name}.{known} is of type {kind}: only numbers can be start values")
+            if kind not in REAL and not float(value).is_integer():
+                raise WiringError(f"{name}.{known} starts with {value:g}: it must be a whole number")
         # an output without a list depends on all inputs; a Python FMU has no lists, and its outputs follow at the next step
         wrapped = str(description.generationTool).startswith("PythonFMU")
         inputs = [] if wrapped else [v for v in description.modelVariables if v.causality == "input"]

@@ -125,7 +125,9 @@ fmu.instantiate().start()
 i = fmu.instantiate().start()
 def last():
     time = c_double()
-    assert i._call("GetRealStatus", c_int(2), byref(time)) == 0
+    status = c_int(-1)
+    assert i._call("GetRealStatus", c_int(2), byref(time)) == i._call("GetStatus", c_int(0), byref(status)) == 0
+    assert status.value == 2 * i.terminated()[1]
     return i.terminated(), time.value
 before = i.save()
 i.run([1e-3, 1e-3])

@@ -70,6 +70,12 @@ def test_ports_that_are_not_real_are_not_connected(folder: Path, new: str, kind:
         system(folder, '"linkage.drive.torque" = "pump.torque"', new).wiring()
 
 
+@pytest.mark.parametrize("value", ["0.5", "nan"])
+def test_start_values_that_are_not_of_their_type_are_refused(folder: Path, value: str) -> None:
+    with pytest.raises(WiringError, match="a whole number"):
+        system(folder, "displacement = 2e-6", f"valve = {value}").wiring()
+
+
 def rewrite(source: Path, target: Path, name: str, *changes: tuple[str, str]) -> Path:
     """Copy an archive with texts of one of its files replaced."""
     with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as made:
