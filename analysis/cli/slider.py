@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -162,9 +161,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
 def _write_solution(solution: Solution, folder: Path, case: SliderCase, plot: bool) -> list[Path]:
     from ..synthesis import assess
 
-    title, make = case.synthesis.title, case.synthesis.make
-    if case.drive is not None:
-        make = replace(make, speed=case.drive.speed)
+    title, make = case.synthesis.title, case.machine(solution)
     written = write_description_files(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     written += write_linkages([solution], folder, title, make=make)
     return written + common.save_plot(plot, solution, folder / "linkage.png", title=title)
@@ -186,6 +183,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plot: bool) 
 
     If the case has a table [tracking], also simulate the motion with a controller.
     """
+    from ..export.controllers import HARMONICS
     from ..files import write_csv, write_tables
     from ..run import save_parameters
     from ..slider import run_case
@@ -210,6 +208,8 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plot: bool) 
             head="a controller lets the slider follow its motion: linkwork system run system.toml",
         ),
     ]
+    if drive.slider.order > HARMONICS:
+        common.print_error(f"note: the reference in system.toml has the first {HARMONICS} harmonics of the motion only")
     written += common.save_plot(plot, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plot)
@@ -246,6 +246,13 @@ def _print_drive(title: str, drive: SliderDrive) -> None:
 def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plot: bool) -> list[Path]:
     from ..files import write_csv
 
+    assert chosen.tracking is not None
+    period, design = chosen.tracking.period, chosen.design(drive)
+    if design is not None and (growth := float(abs(design.sampled_poles(period)[-1]))) >= 1.0:
+        common.print_error(
+            f"note: sampled every {period:g} s, the feedback is unstable: errors grow by a factor of {growth:.3g} from "
+            "sample to sample; shorten tracking.period or lower tracking.bandwidth"
+        )
     run = chosen.run_tracking(drive)
     loop = run.loop
     if loop.status:

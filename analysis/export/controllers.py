@@ -335,11 +335,15 @@ def _series(name: str, unit: str, text: str) -> tuple[Row, ...]:
 
 
 class MotionReference(Controller):
-    """A motion as a function of the crank angle, and the force that belongs to it: Fourier series of six harmonics."""
+    """A motion as a function of the crank angle, and the force that belongs to it: Fourier series of six harmonics.
+
+    A controller uses the outputs at its next sample: with ``lead`` they are those of the angle that the crank has then.
+    """
 
     rows = (
         *_series("motion", "m", "Position"),
         *_series("load", "N", "Force"),
+        Row("lead", "parameter", "s", 0.0, "Time ahead for which the outputs are computed", "not negative"),
         Row("angle", "input", "rad", 0.0, "Crank angle"),
         Row("speed", "input", "rad/s", 0.0, "Crank speed"),
         Row("position", "output", "m", 0.0, "Position there"),
@@ -355,7 +359,8 @@ class MotionReference(Controller):
     def _evaluate_series(self, name: str) -> tuple[float, float]:
         value, slope = getattr(self, f"{name}_0"), 0.0
         for n in range(1, HARMONICS + 1):
-            a, b, angle = getattr(self, f"{name}_cos_{n}"), getattr(self, f"{name}_sin_{n}"), n * self.angle
+            a, b = getattr(self, f"{name}_cos_{n}"), getattr(self, f"{name}_sin_{n}")
+            angle = n * (self.angle + self.lead * self.speed)
             value += a * cos(angle) + b * sin(angle)
             slope += n * (b * cos(angle) - a * sin(angle))
         return value, slope

@@ -296,7 +296,7 @@ def run_loop(
     ahead = [*times[1:].tolist(), float(times[-1]) + controller.period]
     for t, later in zip(times.tolist(), ahead):
         measured = tuple(plant.measure())
-        wanted = reference(t) if callable(reference) else reference
+        wanted = si(reference(t), unit, "reference") if callable(reference) else reference
         if not isfinite(wanted):
             raise InputError(f"the reference is {wanted} {unit} at t = {t:.9g} s: it must be a finite number")
         force = controller.force(measured, wanted)

@@ -431,6 +431,8 @@ def _make_table(
 ) -> Piecewise:
     if file is None:
         return table(times, values, interpolation)
+    if len(times) or len(values):
+        raise InputError(f"a table has times and values, or the file {file}: it cannot have both")
     path = folder / file
     found, columns = files.read_record(path)
     if len(columns) != 2:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from cmath import rect
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from math import inf, isfinite, pi
+from math import cos, inf, isfinite, pi, sin
 from pathlib import Path
 from typing import Any, get_args
 
@@ -115,7 +116,7 @@ class TrackingTable:
     period: float = files.entry(files.Quantity("s", above=0.0), 1e-3)
     bandwidth: float | None = files.entry(files.Quantity("rad/s", least=0.0), None)
     feedforward: bool = files.entry(files.flag, True)
-    revolutions: float = files.entry(files.Quantity("1", above=0.0), 5.0)
+    revolutions: float = files.entry(files.Quantity("1", least=1.0), 5.0)
     limit: float = files.entry(files.Quantity("N", above=0.0), inf)
     coulomb_friction: float | None = files.entry(files.Quantity("N", least=0.0), None)
     mass_error: float = files.entry(files.Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
@@ -157,6 +158,7 @@ class SliderCase:
     tracking: TrackingTable | None = files.entry(files.Table(TrackingTable), None)
 
     def __post_init__(self) -> None:
+        syn.check_task("four-bar", self.synthesis.task)
         if self.linkage is not None and not self.free and self.synthesis.bounds:
             first, limits = next(iter(self.synthesis.bounds.items()))
             raise ParameterError(
@@ -237,16 +239,38 @@ class SliderCase:
 
     # Dynamics
 
+    def machine(self, solution: syn.Solution) -> syn.MachineSpec:
+        """Return the machine of the synthesis, with the speed, the load and the best spring of this case."""
+        make, wanted, linkage = self.synthesis.make, self.drive, solution.linkage
+        if wanted is None:
+            return make
+        load = self.load or Load()
+        whole = complex(*make.load) + complex(load.fx, load.fy) * rect(1.0, linkage.ground_angle)
+        make = replace(make, speed=wanted.speed, load=(whole.real, whole.imag))
+        if wanted.best_spring and not isinstance(linkage.pivot, syn.SecondCrank):
+            motion, speed = motion_of_plant(linkage), solution.direction * wanted.speed
+            found = best_spring(
+                make.sliding_five_bar(linkage), motion, speed, load=self._load(make, linkage), samples=wanted.samples
+            )
+            make = replace(make, slider_stiffness=found.stiffness, slider_spring_free_position=found.free_position)
+        return make
+
+    def _load(self, make: syn.MachineSpec, linkage: syn.Linkage) -> tuple[float, float]:
+        """Return the load of a machine (N), along the ground link and to its left."""
+        fx, fy = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
+        return float(fx), float(fy)
+
     def compute_drive(self, solution: syn.Solution) -> SliderDrive:
         """Compute force, torque and pin forces of a solution's motion; the crank turns in the sense of the task."""
-        wanted = self.drive
-        assert wanted is not None
-        speed = solution.direction * wanted.speed
-        motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.sliding_five_bar(solution.linkage)
-        load = (0.0, 0.0) if self.load is None else (self.load.fx, self.load.fy)
-        if wanted.best_spring:
-            parameters = best_spring(parameters, motion, speed, load=load, samples=wanted.samples).parameters
-        return inverse_dynamics(parameters, motion, speed, load=load, samples=wanted.samples)
+        assert self.drive is not None
+        make, linkage = self.machine(solution), solution.linkage
+        return inverse_dynamics(
+            make.sliding_five_bar(linkage),
+            motion_of_plant(linkage),
+            solution.direction * self.drive.speed,
+            load=self._load(make, linkage),
+            samples=self.drive.samples,
+        )
 
     def run_tracking(self, drive: SliderDrive) -> TrackingResult:
         """Run the plant, which may differ from the model, under the tracking controller."""
@@ -263,7 +287,7 @@ class SliderCase:
             model,
             drive.slider,
             wanted.period,
-            design=self._design(drive, wanted),
+            design=self.design(drive),
             feedforward=wanted.feedforward,
             load=drive.load if wanted.load_known else (0.0, 0.0),
             limit=wanted.limit,
@@ -276,8 +300,9 @@ class SliderCase:
             load=drive.load,
         )
 
-    def _design(self, drive: SliderDrive, wanted: TrackingTable) -> Design | None:
+    def design(self, drive: SliderDrive) -> Design | None:
         """Design the feedback of the tracking controller; return None if its bandwidth is zero."""
+        wanted = self.tracking or TrackingTable()
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         if bandwidth <= 0.0:
             return None
@@ -292,9 +317,10 @@ class SliderCase:
         """
         from ..export.controllers import HARMONICS
 
-        wanted = self.tracking or TrackingTable()
-        design = self._design(drive, wanted)
-        reference: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
+        wanted, design = self.tracking or TrackingTable(), self.design(drive)
+        period = with_unit(wanted.period, "s")
+        # the controller uses the reference one sample later
+        reference: dict[str, Any] = {"sample_time": period, "lead": period}
         # samples at equal angles over a turn, from 0, where the crank starts
         for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", drive.force)):
             forwards = samples if drive.crank_speed > 0.0 else np.roll(samples[::-1], 1)
@@ -303,7 +329,7 @@ class SliderCase:
             for n in range(1, HARMONICS + 1):
                 reference[f"{name}_cos_{n}"] = with_unit(series.cos[n], unit)
                 reference[f"{name}_sin_{n}"] = with_unit(series.sin[n], unit)
-        controller: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
+        controller: dict[str, Any] = {"sample_time": period}
         if design is not None:
             gain, derivative_gain = design.gains.tolist()
             controller["gain"], controller["derivative_gain"] = (
@@ -325,12 +351,12 @@ class SliderCase:
                 "reference.speed": "linkage.crank.speed",
                 "controller.reference": "reference.position",
                 "controller.measured": "linkage.slider.position",
-                "controller.feed_forward": "reference.force",
+                **({"controller.feed_forward": "reference.force"} if wanted.feedforward else {}),
                 "linkage.slider.force": "controller.force",
             },
             "run": {
                 "stop_time": with_unit(wanted.revolutions * drive.period, "s"),
-                "step": with_unit(wanted.period, "s"),
+                "step": period,
             },
         }
 

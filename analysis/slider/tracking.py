@@ -173,9 +173,12 @@ class TrackingResult:
         Raises
         ------
         InputError
-            If the run ended before its last turn was complete.
+            If the run ended early, or is shorter than a turn.
         """
-        last = self.loop.end(2.0 * pi / abs(self.crank_speed))
+        turn, length = 2.0 * pi / abs(self.crank_speed), float(self.loop.time[-1])
+        last = self.loop.end(turn)
+        if length < turn * (1.0 - 1e-9):
+            raise InputError(f"the run of {length:.4g} s is shorter than a turn, {turn:.4g} s: it has no last turn")
         error, point_error, force, power = (
             values[last] for values in (self.error, self.point_error, self.loop.force, self.power)
         )

@@ -99,6 +99,7 @@ from .task.limit_position import mechanical_advantage as mechanical_advantage
 from .task.limit_position import time_ratio as time_ratio
 from .task.limit_position import toggles as toggles
 from .task.limits import GEARS as GEARS
+from .task.limits import check_task as check_task
 from .task.target import Straightness as Straightness
 from .task.target import TargetPath as TargetPath
 from .task.target import area_difference as area_difference

@@ -43,17 +43,17 @@ static inline void StateFeedbackController_sample(StateFeedbackController *c) {
 
 typedef struct {
     double sample_time, motion[1], motion_cos[HARMONICS + 1], motion_sin[HARMONICS + 1];
-    double load[1], load_cos[HARMONICS + 1], load_sin[HARMONICS + 1], angle, speed;
+    double load[1], load_cos[HARMONICS + 1], load_sin[HARMONICS + 1], lead, angle, speed;
     double position, velocity, force;
     long count;
 } MotionReferenceController;
 
 static inline void MotionReferenceController_sample(MotionReferenceController *c) {
-    double slope = 0.0;
+    double slope = 0.0, angle = c->angle + c->lead * c->speed;
     c->position = c->motion[0];
     c->force = c->load[0];
     for (int n = 1; n <= HARMONICS; n++) {
-        double cosine = cos(n * c->angle), sine = sin(n * c->angle);
+        double cosine = cos(n * angle), sine = sin(n * angle);
         c->position += c->motion_cos[n] * cosine + c->motion_sin[n] * sine;
         slope += n * (c->motion_sin[n] * cosine - c->motion_cos[n] * sine);
         c->force += c->load_cos[n] * cosine + c->load_sin[n] * sine;

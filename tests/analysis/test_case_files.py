@@ -235,6 +235,7 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),
+        ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"\ntimes = [0, 1]', "cannot have both"),
         ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"', "no.csv cannot be read: No such file"),
         ('mechanism = "slider_crank"', "did you mean slider-crank"),
         ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),

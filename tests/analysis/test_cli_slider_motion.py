@@ -12,13 +12,14 @@ from click.testing import CliRunner, Result
 
 from analysis import cli, slider
 from analysis.numerics.fourier import FourierSeries
-from analysis.run import load_case, load_parameters, simulate
+from analysis.run import load_case, load_parameters, read_case, simulate
 from analysis.slider import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.synthesis import (
     Linkage,
     Search,
     SecondCrank,
     SliderMotion,
+    Solution,
     SynthesisInterrupted,
     TimedPath,
     evaluate,
@@ -93,8 +94,9 @@ def test_the_example_does_what_it_says(linkwork, tmp_path) -> None:
 
 def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> None:
     """The control force as a table over time, on the plant in process, through one turn: slider and coupler point."""
-    load = {"fx": "2 N", "fy": "-3 N"}
-    result = linkwork(tables(drive={"speed": "120 rpm"}, load=load), "--no-plots", "--out", "moved")
+    load, make = {"fx": "2 N", "fy": "-3 N"}, {"slider_damping": "20 N*s/m", "load": ["1 N", "4 N"]}
+    drive = {"speed": "120 rpm", "best_spring": True}
+    result = linkwork(tables(drive=drive, load=load, make=make), "--no-plots", "--out", "moved")
     assert result.exit_code == 0, result.output
     case = load_case(tmp_path / "moved" / "five-bar.toml")
     assert case.stop_time == pytest.approx(0.5)
@@ -120,13 +122,27 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     reached = np.column_stack([run["P.x"], run["P.y"]]) @ [1.0, 1j]
     phi = run["crank.angle"] - BASE.ground_angle - BASE.crank_phase
     assert np.abs(reached - replace(BASE, pivot=MOTION).path(phi) @ [1.0, 1j]).max() < 1e-6
+    force = np.interp(phi, columns["crank rotation [rad]"], columns["slider.force [N]"], period=2.0 * pi)
+    assert run["pivotDrive.applied_force"] == pytest.approx(force, abs=1e-3)
     again = CliRunner().invoke(cli.main, ["run", "moved/five-bar.toml", "--no-plot"], catch_exceptions=False)
     assert again.exit_code == 0, again.output
 
 
+def test_a_pivot_that_is_set_and_kept_is_held_in_the_described_linkage(tmp_path) -> None:
+    chosen = read(tmp_path, tables(drive={"speed": "60 rpm"}))
+    solution = Solution.from_linkage(
+        chosen.synthesis.task, BASE.with_pivot(SliderMotion(FourierSeries.constant(0.01), 0.4))
+    )
+    own = read_case(solution.described_case(chosen.machine(solution), "held"), folder=tmp_path)
+    run = simulate(own.parameters, own.inputs, initial=own.initial, stop_time=0.2)
+    assert run["pivot.position"] == pytest.approx(np.full(len(run), 0.01), abs=1e-15)
+
+
 def test_the_motion_that_made_the_path_is_found_and_its_numbers_are_reported(linkwork, tmp_path) -> None:
-    result = linkwork(tables(drive={"speed": "120 rpm"}), "--no-plots")
+    slow = {"period": "50 ms", "revolutions": 1}
+    result = linkwork(tables(drive={"speed": "120 rpm"}, tracking=slow), "--no-plots")
     assert "wrote out/motion.csv" in result.output
+    assert "sampled every 0.05 s, the feedback is unstable: errors grow by a factor of" in result.output
     assert not list((tmp_path / "out").glob("*.png"))
     columns = csv(tmp_path / "out" / "motion.csv")
     phi, u, slope = (columns[name] for name in ("crank rotation [rad]", "slider position [m]", "du/dphi [m/rad]"))
@@ -172,6 +188,9 @@ def test_tracking_without_feed_forward_is_worse(tmp_path) -> None:
         chosen = read(tmp_path, tables(drive=drive, tracking={"revolutions": 2} | options))
         solution = chosen.find_motion(chosen.find_four_bar(), 1, (), progress=False).best
         errors.append(chosen.run_tracking(chosen.compute_drive(solution)).metrics().rms_error)
+        system = chosen.system(chosen.compute_drive(solution), "five-bar.toml")
+        assert ("controller.feed_forward" in system["connections"]) == options.get("feedforward", True)
+        assert system["parts"]["reference"]["values"]["lead"] == "0.001 s"
     both, feedback, forward, wrong = errors
     assert both < 1e-6
     assert feedback > 20.0 * both
@@ -355,6 +374,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"drive": {}}, "drive.speed"),
         ({"drive": {"speed": "0 rpm"}}, "drive.speed"),
         ({"drive": {"speed": "60 rpm"}, "tracking": {"period": "0 s"}}, "tracking.period"),
+        ({"drive": {"speed": "60 rpm"}, "tracking": {"revolutions": 0.5}}, "tracking.revolutions"),
         ({"drive": {"speed": "60 rpm"}, "tracking": {"mass_error": -1}}, "tracking.mass_error"),
         ({"drive": {"speed": "60 rpm"}, "tracking": {"bandwidth": "-1 rad/s"}}, "tracking.bandwidth"),
         ({"strategy": {}}, "strategy.tolerance"),
@@ -362,6 +382,8 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"strategy": {"tolerance": "1 mm", "criterion": "mean"}}, "strategy.criterion"),
         ({"strategy": {"tolerance": "1 mm", "ratios": [1.5]}}, "strategy.ratios"),
         ({"task": {"kind": "timed-path", "points": [[0, 0]]}}, "points"),
+        ({"task": {"kind": "slider-function", "position": [0.2, 0.1, 0.2]}}, "SliderFunction needs a slider at C"),
+        ({"task": {"kind": "quick-return", "stroke": "10 cm", "time_ratio": 1.3}}, "it is for a slider-crank"),
         ({"constraints": {"largest_link": "10 mm"}}, "143.5 mm"),
     ],
 )

@@ -178,6 +178,20 @@ def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, 
     np.testing.assert_allclose(*forces, atol=1e-2 * forces[0].max())
 
 
+def test_both_files_of_a_slider_crank_have_the_same_spring_damper_and_friction(tmp_path) -> None:
+    crank = syn.SliderCrank(ground_length=0.02, crank_length=0.05, coupler_length=0.2, ground_angle=0.3)
+    task = syn.SliderFunction(position=[0.2, 0.15, 0.2], rotation=[0.0, 1.0, 2.0])
+    spring = {"slider_stiffness": 900.0, "slider_spring_free_position": 0.15}
+    make = syn.MachineSpec(speed=15.0, slider_damping=40.0, slider_coulomb_friction=3.0, **spring)
+    solution = syn.Solution.from_linkage(task, crank)
+    torques = []
+    for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
+        ran = read_case(tables, folder=tmp_path)
+        run = simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.4, step=0.02)
+        torques.append(run["drive.applied_torque"])
+    np.testing.assert_allclose(*torques, atol=1e-6 * np.abs(torques[0]).max())
+
+
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     asked = []

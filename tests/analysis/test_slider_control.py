@@ -413,6 +413,8 @@ def test_bad_loops_are_reported(held) -> None:
         lin.control_loop(
             TABLE_3_1, controller, lambda t: 0.0 if t < 0.045 else float("nan"), initial=InitialState(), stop_time=0.1
         )
+    with pytest.raises(ParameterError, match="reference is '2 deg'"):
+        lin.predict_loop(held, controller, lambda t: "2 deg", stop_time=0.1)
     with pytest.raises(InputError, match="2 finite"):
         lin.predict_loop(held, controller, 0.0, stop_time=0.1, deviation=[1.0])
     with pytest.raises(InputError, match="2 finite"):

@@ -202,6 +202,8 @@ def test_bad_runs_are_told(pid) -> None:
         run(limit=0.0)
     with pytest.raises(InputError, match="sampling period is 0"):
         run(period=0.0)
+    with pytest.raises(InputError, match="shorter than a turn"):
+        run(revolutions=0.5).metrics()
     with pytest.raises(InputError, match="-1 revolutions"):
         run(revolutions=-1)
     with pytest.raises(InputError, match="crank speed is 0"):

@@ -226,6 +226,15 @@ def test_an_experiment_that_cannot_be_run_fails(
     assert said in result.stderr
 
 
+def test_an_experiment_without_reference_is_told(natives: dict[str, Path], tmp_path: Path) -> None:
+    bare = OTHER.replace('<References source="sub/a%20b.csv"/>', "")
+    twice = bare.replace("</e:Experiments>", bare.partition("<e:Experiment ")[1] + bare.partition("<e:Experiment ")[2])
+    fmu = of_other_make(natives["FiveBarSlider-native"], tmp_path / "a.fmu", **{"other.exp": twice})
+    result = linkwork("verify", fmu)
+    assert "2 of 2 experiments pass" in result.stdout
+    assert "note: without reference results, so that nothing was compared: coast, coast" in result.stderr
+
+
 def test_the_command(natives: dict[str, Path]) -> None:
     result = linkwork("verify", natives["SliderCrank-native-fmi3"])
     assert result.exit_code == 0, result.output

@@ -200,6 +200,10 @@ def test_a_motion_reference_is_its_series_and_the_rate_its_derivative() -> None:
     assert series.position == pytest.approx(0.5 + 0.2 * np.cos(0.7) - 0.1 * np.sin(2.1))
     assert series.velocity == pytest.approx(4.0 * (places[1] - places[0]) / (2.0 * step), rel=1e-8)
     assert series.force == pytest.approx(7.0 * np.sin(1.4))
+    ahead = (series.position, series.velocity, series.force)
+    series.angle, series.lead = 0.3, 0.1
+    series.sample(0.0)
+    assert (series.position, series.velocity, series.force) == pytest.approx(ahead)
 
 
 def test_a_force_table_is_met_at_its_points_and_straight_between_them_in_every_turn() -> None:

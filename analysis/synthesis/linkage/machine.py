@@ -53,8 +53,8 @@ class MachineSpec:
     slider_mass, slider_stiffness, slider_damping : float, optional
         Properties of the slider that carries D (kg, N/m, N.s/m); by default those of a block on a spring so stiff that D
         hardly moves.
-    slider_coulomb_friction : float
-        Coulomb friction of the slider (N).
+    slider_coulomb_friction, slider_spring_free_position : float
+        Coulomb friction of the slider (N); slider position at which its spring is free (m).
     gravity : float
         Acceleration of gravity (m/s2).
     speed : float
@@ -73,6 +73,7 @@ class MachineSpec:
     slider_stiffness: float | None = entry(Quantity("N/m", least=0.0), None)
     slider_damping: float | None = entry(Quantity("N.s/m", least=0.0), None)
     slider_coulomb_friction: float = entry(Quantity("N", least=0.0), 0.0)
+    slider_spring_free_position: float = entry(Quantity("m"), 0.0)
     gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
     speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
     crank_mass: float | None = entry(Quantity("kg", above=0.0), None)
@@ -158,6 +159,7 @@ class MachineSpec:
             slider_stiffness=self.slider_stiffness or 0.0,
             slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
+            slider_spring_free_position=self.slider_spring_free_position,
             gravity_x=-self.gravity * sin(a1),
             gravity_y=-self.gravity * cos(a1),
             assembly_branch=linkage.branch,
@@ -182,7 +184,8 @@ class MachineSpec:
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
-        return replace(made, **self.link_masses(asdict(made)) | (self.slider_as_rocker(far) if sliding else {}))
+        own = self.link_masses(asdict(made)) | {"slider_spring_free_position": self.slider_spring_free_position}
+        return replace(made, **own | (self.slider_as_rocker(far) if sliding else {}))
 
     def slider_as_rocker(self, far: Any) -> dict[str, Any]:
         """Return mass, moment of inertia and centre of mass of the rocker that represents the slider of a slider-crank.
@@ -462,9 +465,22 @@ def description(
                 "phase": with_unit(remainder(phase, tau), "rad"),
             }
         }
+    if "slides" in tables and (spring := _spring_table(make)):
+        tables["springs"] = {"slider": {"at": "guide"} | spring}
     if acting := loads(linkage, make):
         tables["loads"] = list(acting)
     return tables
+
+
+def _spring_table(make: MachineSpec) -> dict[str, Any]:
+    """Return spring, damper and friction of the slider as a description has them; without those that are zero."""
+    values = {
+        "stiffness": (make.slider_stiffness, "N/m"),
+        "free": (make.slider_stiffness and make.slider_spring_free_position, "m"),
+        "damping": (make.slider_damping, "N.s/m"),
+        "friction": (make.slider_coulomb_friction, "N"),
+    }
+    return {name: with_unit(value, unit) for name, (value, unit) in values.items() if value}
 
 
 def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
@@ -483,11 +499,12 @@ def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direct
     crank speed.
     """
     pivot = linkage.pivot
-    if pivot is None or not pivot.series.order:
+    sliding = isinstance(pivot, SliderMotion)
+    if pivot is None or not (sliding or pivot.series.order):
         return {}
     speed = direction * make.speed
     rate = speed / linkage.turns
-    slope, unit = pivot.series.derivative(), "m/s" if isinstance(pivot, SliderMotion) else "rad/s"
+    slope, unit = pivot.series.derivative(), "m/s" if sliding else "rad/s"
     k = np.arange(1, slope.order + 1)
     waves = {
         "kind": "harmonics",
@@ -497,7 +514,8 @@ def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direct
     }
     if isinstance(pivot, SecondCrank):
         waves["mean"] = with_unit(speed * pivot.ratio, unit)
-    return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": waves}}
+    moved = waves if pivot.series.order else with_unit(0.0, unit)
+    return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": moved}}
 
 
 def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from ..task.constraint import (
     MaxPinForce,
     Stroke,
 )
-from ..task.limits import GEARS, Limits, limits_by_kind, make_limits, place_as_task, usual_kinds
+from ..task.limits import GEARS, Limits, check_task, limits_by_kind, make_limits, place_as_task, usual_kinds
 from ..task.task import Normal, Task, UntimedPath, normal_form, replace_weights
 from .polish import EXACT, Polished, distinct_answers, feasible_answers, infeasible_error, polish
 from .scan import scan
@@ -320,6 +320,7 @@ def improve(
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
+    check_task("four-bar", task)
     task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)

@@ -398,7 +398,7 @@ def limits_by_kind(
     for kind in kinds:
         if kind not in get_args(Kind):
             raise unknown_name(kind, get_args(Kind), f"kind {kind!r}")
-        _check_task(kind, task)
+        check_task(kind, task)
         if isinstance(constraints, Sequence):
             _check_constraints(kind, constraints)
         if kind == "four-bar":
@@ -413,10 +413,11 @@ def limits_by_kind(
     return found
 
 
-def _check_task(kind: Kind, task: Task) -> None:
+def check_task(kind: Kind, task: Task) -> None:
+    """Raise InputError if linkages of a kind cannot do a task, because they have no slider, or no rocker."""
     if isinstance(task, SliderFunction) and kind != "slider-crank":
         raise InputError(
-            f"a {type(task).__name__} needs a slider, and a {kind} has none: kinds must be ('slider-crank',)"
+            f"a {type(task).__name__} needs a slider at C, and a {kind} has none: it is for a slider-crank"
         )
     if isinstance(task, RockerFunction) and kind == "slider-crank":
         raise InputError("a RockerFunction needs a rocker, and a slider-crank has none: ask for a SliderFunction")
