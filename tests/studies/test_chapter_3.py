@@ -164,6 +164,9 @@ class TestFreeMotion:
     def test_without_the_damper_the_mean_speed_falls_and_rises_again(self) -> None:
         assert "between 0.64 and 1.04 of" in statement("3.12", "The oscillatory behaviour of the speed").why
 
+    def test_launch_without_a_damper_that_ends_early(self) -> None:
+        assert "T0 = 2e8 dyn.cm the links become collinear after 4 turns" in statement("3.6", "The decaying aspect").why
+
     def test_with_the_mean_effective_mass(self) -> None:
         half = 0.5 * natural_frequency(runs.table_3_1(free_crank.STIFF))
         assert half == pytest.approx(published.HALF_NATURAL_FREQUENCY_RAD_S, abs=0.005)
@@ -184,6 +187,11 @@ class TestFormulation:
     def test_start_is_that_of_the_independent_derivation(self) -> None:
         w = formulation.solve_multipliers(*formulation.closed_loop_state(0.0, 0.0, formulation.OMEGA, 0.0))
         assert w[0] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * published.DYN_CM, rel=1e-9)
+
+    def test_equations_of_chapter_2_but_for_a_cosine(self) -> None:
+        found = formulation.chapter_2_residuals()
+        assert len(found) == 10
+        assert [name for name, residual in found.items() if residual > 1e-12] == ["(2.20)"]
 
     def test_closure_shows_nothing_where_kinematics_close_the_loop(self) -> None:
         run = formulation.integrate_both(4e-3)

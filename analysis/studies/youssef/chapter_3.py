@@ -43,12 +43,13 @@ forces, and advise integrating all second derivatives, so that the closure of th
 Sections 3.2 and 3.3 compute the linkage of Table 3.1: without a spring, with three springs, launched by a torque, and in free
 motion.
 
-**What stands.** The equations (3.8) and (3.10) are right, except for a minus that our scan lacks. The multipliers are the
-force at C and the crank torque. At constant speed the failure of closure does show the error of the integration: it is some
-five to fifteen times the slider's error. In a launch with short steps it is far smaller than the error. The program of
-appendix 1 prints the closure but integrates the slider alone, so that its own check shows nothing. The torque reverses
-near 0 deg and hardly depends on the spring. The linear rise of the speed in a launch, the decay by the damper, the phase
-planes, and half the natural frequency near 27 rad/s are as described.
+**What stands.** The equations of motion are right, except for a cosine in (2.20) that must be a sine; so are (3.8) and
+(3.10), except for a minus that our scan lacks. The multipliers are the force at C and the crank torque. At constant speed the
+failure of closure does show the error of the integration: it is some five to fifteen times the slider's error. In a launch
+with short steps it is far smaller than the error. The program of appendix 1 prints the closure but integrates the slider
+alone, so that its own check shows nothing. The torque reverses near 0 deg and hardly depends on the spring. The linear rise
+of the speed in a launch, the decay by the damper, the phase planes, and half the natural frequency near 27 rad/s are as
+described.
 
 **What does not.** Without a spring the slider does not drift along a line. The mean of the inertia forces pushes it towards
 the crank, the more strongly the nearer it comes, so that ten turns look straight only with the two strongest dampers. With
@@ -473,7 +474,9 @@ def _torque_causes() -> list[Statement]:
             "The energy dissipation in the slider guide due to viscous friction also accounts for variations in "
             "torque.",
             text("3.2.1, L2013-2017"),
-            f"share of the damper's power in {difference}",
+            f"torque that supplies the damper's power, as a share of {difference}. The rest changes the energies of links and "
+            "spring. The shares of the rows before are of another kind: parts of the crank's equation, in which the damper "
+            "does not occur",
             f"more than {ALIKE:g}, the rule for *the same*",
             tuple(at_least(name, ALIKE, x) for name, x in shares["damper"].items()),
         ),

@@ -251,7 +251,7 @@ def compute_first() -> StudyResult:
                 (*judge_growth(1), *judge_growth(2)),
             ),
             Statement(
-                "THIS PROG. I[NVE]STIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
+                "THIS[ ]PROG. I[N]VISTIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
                 listing("appendix 2, L8398"),
                 "*investigates* is read as finds right: speed and height of the peak of the first harmonic, and height of "
                 f"the peak of the second, by the listing and by the right equation. omega_c = {DAMPERS[0]:g} 1/s is the "

@@ -17,6 +17,7 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
@@ -36,7 +37,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, listing, near, text
 from ..study import Study, StudyResult
 from .linearised import with_crank
-from .regions import LOOKS, WAYS, appendix_3_region, axis, equation, hill_region, orbit_region
+from .regions import LOOKS, WAYS, appendix_3_region, axis, crank_speed, equation, hill_region, orbit_region
 from .runs import SIGN
 
 FINDINGS = """\
@@ -185,6 +186,17 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             ),
         ),
         Statement(
+            "The stability of equation (4.29) may be investigated by considering the homogeneous part of it only.",
+            text("5.1, L3266-3268"),
+            "multipliers of the right linear equation with its force F, from solutions with three starts, minus those without "
+            "F, in the middle of the first region at I4 = 1. Then, for the mechanism: distance of the region's boundaries "
+            "by the right linear equation from those of the true periodic motion, relative to the region's width, the greater "
+            "of the two",
+            f"1e-6, the accuracy of the solutions; {SMALL:g}, the rule for *small*",
+            judge_homogeneous_part(),
+            "the mechanism is stable or not about the motion that F forces, and this motion grows with I4 (erratum 6)",
+        ),
+        Statement(
             "Also notice that a region was not obtained but merely a boundary of two stable regions.",
             text("5.1.1 a, L3420-3424"),
             "number of boundaries, below the second region, at which a Floquet multiplier is 1. Then the larger of the two "
@@ -205,7 +217,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             judge_formulas(),
         ),
         Statement(
-            "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
+            "THIS PROG. INVISTIGATES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
             "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing exactly as printed, at its I4 = "
             "0.5 and at sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
@@ -217,6 +229,28 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "M' zeta' and 1/k0 are missing, and the harmonics of mass and stiffness are wrong (errata 2, 16, 18, 20)",
         ),
     )
+
+
+def judge_homogeneous_part() -> tuple[Case, ...]:
+    """Judge whether the force changes the multipliers of the linear equation, and the boundaries of the mechanism's region."""
+    region = hill_region(chapter_4(1.0))
+    with_force = slider_equation(chapter_4(1.0), crank_speed(0.5 * (region.low + region.high)))
+    without = with_force.homogeneous().stiffened(with_force.spring)
+
+    def derivative(t: float, y: NDArray[np.float64]) -> list[float]:
+        a, b, c, force = (float(x(t)) for x in (without.a, without.b, without.c, with_force.force))
+        return [y[1], (force - b * y[1] - c * y[0]) / a]
+
+    starts = ([0.0, 0.0], [1.0, 0.0], [0.0, 1.0])
+    rest, *others = (solve_ivp(derivative, (0.0, 2.0 * pi), y, rtol=1e-10, atol=1e-12).y[:, -1] for y in starts)
+    found = np.linalg.eigvals(np.transpose(others) - rest[:, None])
+    apart = np.abs(np.sort(found.real) - np.sort(hill_multipliers(without).real)).max()
+    cases = [at_most("multipliers of the linear equation", 1e-6, apart)]
+    for ratio in COMPARED:
+        linear, true = (method(chapter_4(ratio)) for method in (hill_region, orbit_region))
+        shift = max(abs(linear.low - true.low), abs(linear.high - true.high)) / true.width
+        cases.append(at_most(f"mechanism; I4 = {ratio:g}", SMALL, shift))
+    return tuple(cases)
 
 
 def listed_boundaries(given: SliderEquation) -> tuple[tuple[float, float], ...]:
@@ -315,7 +349,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
             text("5.3.1, L3882-3884"),
             why="the range of I4 in Fig 5.1 is not stated. In the true periodic motion the greatest width, up to sigma2 = "
             "0.1 (L3927), is "
-            + ", ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
+            + " and ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
         ),
     )
 

@@ -321,7 +321,7 @@ def judge_determinant() -> tuple[Statement, ...]:
             f"but relative to the region's width, the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
         ),
         Statement(
-            "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
+            "THIS PROG. INVIST[I]GATES STABILITY IN[ ]PRESENCE [O]F DAMPING",
             listing("appendix 4, L8698"),
             "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation "
             "of the listing (its cut after nine terms does not change these digits) and for the true periodic motion",

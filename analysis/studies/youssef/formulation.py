@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from linkwork.five_bar import kinematics
+from linkwork.five_bar import dynamics, kinematics
 
 from ...figures import Figure, Panel, plot_curves
 from ...run import Hamming, Inputs, TorsionBar, simulate
@@ -40,6 +41,12 @@ TORQUE, ROUNDING = 10.0, 1e-9
 KINK = "the step in which the torque of the launch ends leaves an error along the motion, while the loop stays closed"
 #: Step (s) with which appendix 1 begins: there the estimate of Hamming's method is judged.
 STEP = 1e-3
+#: Mechanism with all the lengths and angles of Fig 2.1, and without a spring; force F1 at P (N, x + iy) and force F2 (N).
+FULL = replace(
+    TABLE, slider_stiffness=0.0, crank_mass=0.15, crank_cog_distance=0.02, coupler_cog_angle=0.1, slider_guide_angle=0.2,
+    ground_inclination=0.3, coupler_point_distance=0.06, coupler_point_angle=0.4,
+)  # fmt: skip
+LOAD, FORCE = 3.0 - 2.0j, 4.0
 #: Errors (m) with which this estimate is tested: of the start, and the unit to which the back values are rounded.
 START_ERROR, UNIT = 1e-5, 1e-6
 
@@ -79,6 +86,74 @@ def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) 
         b[0] += torque
     unknowns: NDArray[np.float64] = np.linalg.solve(a, b)
     return unknowns
+
+
+def chapter_2_residuals() -> dict[str, float]:
+    """Return the greatest residual of each equation (2.11) to (2.21) in motions of the plant, relative to its greatest term.
+
+    The crank turns at constant speed, and then under a torque.
+    """
+    p, worst, load = FULL.constants(), dict[str, float](), LOAD * np.exp(-1j * FULL.ground_inclination)
+    for drive, th in ((drive, th) for drive in (1.0, 0.0) for th in np.linspace(0.0, 6.0, 25).tolist()):
+        u, w, v = 0.01 * cos(2.0 * th), OMEGA, 0.3 * sin(th + 1.0)
+        state, inputs = (th, u, w, v, 0.0, 0.0), dynamics.Inputs(drive, TORQUE, 0.0, FORCE, load.real, load.imag)
+        g = kinematics.position(th, u, p)
+        m = dynamics.motion(g, kinematics.coefficients(g, p), state, inputs, p)
+        pins = dynamics.reactions(g, state, m, inputs, p)
+        for name, terms in chapter_2_terms(th, kinematics.link_angles(g, p), w, v, m, pins).items():
+            # (2.11), (2.12), (2.15) and (2.16) are for constant speed, (2.18) to (2.21) for a torque
+            if (name in ("(2.13)", "(2.14)")) or (name < "(2.17)") == bool(drive):
+                worst[name] = max(worst.get(name, 0.0), abs(sum(terms)) / max(map(abs, terms)))
+    return worst
+
+
+def chapter_2_terms(
+    th2: float, links: tuple[float, float], w: float, v: float, m: dynamics.Motion, pins: dynamics.Reactions
+) -> dict[str, tuple[float, ...]]:
+    """Return the terms of each equation (2.11) to (2.21) as in the scanned text; ``links`` are th3 and th4 + alpha (rad)."""
+    q, p, (th3, th4), g, x, y = FULL, FULL.constants(), links, FULL.gravity, pins.cx, pins.cy
+    alpha, alpha1, swing = q.slider_guide_angle, q.ground_inclination, th2 - th3 - q.coupler_cog_angle
+    tilt2, tilt3, point = th2 + alpha1, th3 + q.coupler_cog_angle + alpha1, th3 + q.coupler_point_angle + alpha1
+    m3r3, m4r4 = q.coupler_mass * q.coupler_cog_distance, q.rocker_mass * q.rocker_cog_distance
+    (x2, y2), (x3, y3), (x4, y4) = (
+        (length * cos(at), length * sin(at)) for length, at in ((p.l2, th2), (p.l3, th3), (p.l4, th4))
+    )
+    crank = (
+        m3r3 * p.l2 * cos(swing) * m.e3,
+        m3r3 * p.l2 * sin(swing) * m.w3**2,
+        x * y2,
+        -y * x2,
+        -m.torque,
+        (p.m2 * q.crank_cog_distance + p.m3 * p.l2) * g * cos(tilt2),
+        LOAD.real * p.l2 * sin(tilt2),
+        -LOAD.imag * p.l2 * cos(tilt2),
+    )
+    coupler = (
+        p.i3b * m.e3,
+        -m3r3 * p.l2 * sin(swing) * w**2,
+        x * y3,
+        -y * x3,
+        m3r3 * g * cos(tilt3),
+        LOAD.real * q.coupler_point_distance * sin(point),
+        -LOAD.imag * q.coupler_point_distance * cos(point),
+    )
+    slider = (x * cos(alpha), y * sin(alpha), p.m45 * g * sin(alpha + alpha1), -FORCE, p.mu * v)
+    e2, a = m.crank_acceleration, m.slider_acceleration
+    along = (y3 * m.e3, a * cos(alpha), x2 * w**2, x3 * m.w3**2, -x4 * m.w4**2)
+    across = (x3 * m.e3, -x4 * m.e4, -a * sin(alpha), -y2 * w**2, -y3 * m.w3**2, y4 * m.w4**2)
+    sin4, cos4 = sin(th4 - alpha), cos(th4 - alpha)
+    return {
+        "(2.11)": crank,
+        "(2.12)": coupler,
+        "(2.13)": (p.i4d * m.e4, -m4r4 * sin4 * a, -x * y4, y * x4, m4r4 * g * cos(th4 + alpha1)),
+        "(2.14)": (p.m45 * a, -m4r4 * sin4 * m.e4, -m4r4 * cos4 * m.w4**2, *slider),
+        "(2.15)": (*along, -y4 * m.e4),
+        "(2.16)": across,
+        "(2.18)": (p.i2b * e2, *crank),
+        "(2.19)": (m3r3 * p.l2 * cos(swing) * e2, *coupler),
+        "(2.20)": (y2 * e2, *along, -x4 * m.e4),
+        "(2.21)": (x2 * e2, *across),
+    }
 
 
 def closed_loop_state(
@@ -328,6 +403,18 @@ def compute() -> StudyResult:
         "of the loop shows the error of the integration.",
         columns=columns,
         statements=(
+            Statement(
+                "Assuming that [F1x and F1y] are the values of the force F1 in the x and y directions the equations of "
+                "motion may be written as follows : [(2.11) to (2.14)] ... Two of these equations are : [(2.18), (2.19)]",
+                text("2.2, eqs (2.11) to (2.21), L796-934"),
+                "residual of each equation divided by its greatest term, with accelerations, force at C and crank torque by "
+                "our equations of motion, at 25 crank angles; (2.13) and (2.14) at constant speed and under a torque. Table "
+                "3.1, with angles, speeds and forces of ours, so that no term is zero. (2.14) is read with the weight of "
+                "rocker and slider, which is illegible in the scan",
+                f"{ROUNDING:g}, above rounding errors",
+                tuple(at_most(name, ROUNDING, x) for name, x in chapter_2_residuals().items()),
+                "(2.20) has cos(theta4 + alpha) theta4'' where (2.15) has the sine",
+            ),
             Statement(
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),

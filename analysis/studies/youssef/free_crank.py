@@ -142,11 +142,18 @@ def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: floa
 
 
 def undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> str:
-    """Return the range of the mean speed of a turn without the damper, in the runs of `damper_cases`, in words."""
+    """Return the range of the mean speed of a turn without the damper, in the runs of `damper_cases`, in words.
+
+    The words also say after how many whole turns a run without the damper ends early.
+    """
     free = np.concatenate([second_halves(runs, start)[0] for runs in pairs.values()])
+    early = {label: Turns.from_run(run, start).speed.size for label, (run, _) in pairs.items() if run.status}
+    ends = "".join(
+        f", and with {label} the links become collinear after {count} turns" for label, count in early.items()
+    )
     return (
         f"without the damper, the mean speed of a turn varies between {free.min():.2f} and {free.max():.2f} of that of the "
-        "first turn"
+        f"first turn{ends}"
     )
 
 
@@ -331,7 +338,8 @@ def soft_phase_plane() -> StudyResult:
             text("3.3, L2293-2297"),
             "higher harmonics of u (root of the sum of their squares) divided by the first harmonic, the least of the turns "
             "drawn. Then this ratio divided by the ratio that the equation linear in u gives for the same motion of the "
-            "crank, the greatest: *non-linear* is read as non-linear in u, since chapter IV linearises in u (L2361)",
+            "crank, the greatest: *non-linear* is read as non-linear in u, since the sentence is about the slider and chapter "
+            "IV linearises in u (L2361); the sentence at L2253 is about the crank, whose inertia changes with its angle",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (

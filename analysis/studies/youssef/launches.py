@@ -280,7 +280,7 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED} in 3 s (our choice)",
+            f"{UNDAMPED} in 3 s (our choice) or until the links become collinear",
             LOSS,
             damper_cases(undamped, 1.0),
             undamped_range(undamped, 1.0),
@@ -303,9 +303,9 @@ def torque_over_time() -> StudyResult:
                 "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
                 "shows a hyperbolic relationship[ ]between T0 and T [the time] asymptotic to [T0 = 0 and T = 0].",
                 text("3.2.2, L2134-2142"),
-                "exponent of the time in T0, the mean of the two exponents between the three torques; least T0 that turns "
-                f"the crank by 1 rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm (our choice), relative to the "
-                f"time at {plain(TORQUES[0])}",
+                "power of the time to which T0 is proportional, the mean of its values between the first two and the last two "
+                f"torques; least T0 that turns the crank by 1 rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm (our "
+                f"choice), relative to the time at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; {SMALL:g}, the rule for *small*, for the asymptotes",
                 (
                     near(
@@ -415,7 +415,8 @@ def launch_speeds_by_spring() -> StudyResult:
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} in 3 s (our choice)",
+            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} in 3 s (our "
+            "choice) or until the links become collinear",
             LOSS,
             (_swing_cases(_spring_runs(), 1.0)[0], *damper_cases(undamped, 1.0)),
             undamped_range(undamped, 1.0),

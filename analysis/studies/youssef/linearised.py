@@ -152,6 +152,13 @@ def coefficient_ratios(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, f
     }
 
 
+def greatest_varying_part() -> float:
+    """Return the greatest of the coefficients B1 to F1 as printed, relative to A1, in the mechanism of 4.5 at I4 = 1."""
+    parts = printed(ratios(chapter_4(1.0)), datum(SIGMA2))
+    series = (parts.spring, parts.inertia, parts.stiffness)
+    return max(abs(x) for one in series for x in (one.cos[1], one.sin[1])) / parts.spring.mean
+
+
 def constant_parts() -> dict[str, float]:
     """Return |h0|/k0 and |g0|/k0 of the correct equation, for mechanisms of chapter V."""
     found = {}
@@ -310,7 +317,7 @@ def _equation() -> list[Statement]:
         ),
         Statement(
             "If equations (4.3a) and (4.8) are substituted into this slider equation, and second and higher order "
-            "multiples of [zeta] and its derivatives are ignored the following linearised equation of motion of the slider "
+            "multiples of [zeta] and its derivatives[ ]are ignored the following linearised equation of motion of the slider "
             "may be obtained. [(4.21)]",
             text("4.2.1, eq (4.21), L2620-2794"),
             "coefficients after division by A1 + B1 cos + C1 sin, the factor of the spring, relative to those of the right "
@@ -326,8 +333,8 @@ def _equation() -> list[Statement]:
                 ),
                 near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
             ),
-            "R1 and S1 are read from appendix 2 (L8449). Not judged are G1, Q1, and the terms with r4 and with the "
-            "coupler's mass",
+            "R1 and S1 are read from appendix 2 (L8449). Not judged are G1 and Q1, which should be of second order, and the "
+            "terms with r4 and with the coupler's mass, which are zero in 4.5",
         ),
     ]
 
@@ -341,7 +348,8 @@ def _simplification() -> list[Statement]:
             "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
             "least a factor [...] in the worst cases.",
             text("4.3, L2797-2801"),
-            why="the factor cannot be read",
+            why="the factor cannot be read, and without it *much smaller* has no measure. With the conditions of 4.5 and I4 = "
+            f"1 the greatest of the coefficients as printed, E1, is {greatest_varying_part():.2f} of A1",
         ),
         Statement(
             "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
