@@ -65,8 +65,10 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
             own = [one if known is None else known.parameters for one, known in zip(each, sets)]
             bound = its.bind_partial(*arguments, **options).arguments
             bound["parameters"] = own if several else own[0]
-            if isinstance(varied := bound.get("vary"), Mapping):
-                sets = [None if known is None else _without_drives(known, varied) for known in sets]
+            driven = varied if isinstance(varied := bound.get("vary"), Mapping) else ()
+            # what a controller moves has no drive of the set either
+            driven = (*driven, *filter(None, [getattr(bound.get("controller"), "channel", None)]))
+            sets = [None if known is None else _without_drives(known, driven) for known in sets]
             for name, fill in fills.items():
                 value: Any = bound.get(name)
                 own_each = several and isinstance(value, (list, tuple))

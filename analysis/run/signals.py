@@ -116,8 +116,11 @@ class TorsionBar:
     release_angle: Amount = 1.0
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.torque):
-            raise InputError(f"torque of the torsion bar is {self.torque}: it must be a finite number of N.m")
+        if not (np.isfinite(self.torque) and self.torque >= 0.0):
+            raise InputError(
+                f"torque of the torsion bar is {self.torque}: it must be a finite number of N.m, not below zero, because a bar "
+                "turns the crank towards the angle of its release, which is positive"
+            )
         if not (np.isfinite(self.release_angle) and self.release_angle > 0.0):
             raise InputError(f"release angle of the torsion bar is {self.release_angle}: it must be above 0 rad")
 

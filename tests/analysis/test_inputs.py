@@ -261,6 +261,7 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: Harmonics(0.0, [1.0], [inf], [0.0]), "finite numbers"),
         (lambda: TorsionBar(torque=nan), "finite number of N.m"),
         (lambda: TorsionBar(torque=1.0, release_angle=0.0), "above 0 rad"),
+        (lambda: TorsionBar(torque="-1 N.m"), "not below zero"),
         (lambda: InductionMotor(breakdown_torque=nan, breakdown_slip=0.2, synchronous_speed=50.0), "breakdown torque"),
         (lambda: InductionMotor(breakdown_torque=1.0, breakdown_slip=0.0, synchronous_speed=50.0), "breakdown slip"),
         (lambda: InductionMotor(breakdown_torque=1.0, breakdown_slip=0.2, synchronous_speed=0.0), "synchronous speed"),

@@ -307,6 +307,14 @@ def test_a_limited_force_is_kept_and_does_not_wind_up(held) -> None:
     assert runs[25.0].overshoot < 0.1
 
 
+def test_a_torque_under_control_takes_the_place_of_a_published_speed() -> None:
+    rest = lin.find_equilibrium("rahman-a4-10-s1-3.5", Inputs(torque=0.0))
+    design = lin.design_pid(lin.linearise("rahman-a4-10-s1-3.5", rest.state, rest.inputs), bandwidth=20.0)
+    controller = lin.SampledController(design, 2e-3)
+    loop = lin.control_loop("rahman-a4-10-s1-3.5", controller, "2 deg", initial=rest.initial, stop_time=1.5)
+    assert loop.position[-1] == pytest.approx(np.radians(2.0), rel=1e-4)
+
+
 def test_the_slider_force_balances_the_crank() -> None:
     upright, model = upright_crank()
     lean = start(model, 0.02, 0.0, 0.0, 0.0)
