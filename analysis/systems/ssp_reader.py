@@ -267,12 +267,10 @@ def _connections(path: str | Path, system: Node, parts: Mapping[str, Part]) -> d
 def _experiment(path: str | Path, root: Node) -> tuple[float, float]:
     """Return stop time and communication step (s)."""
     for experiment in _below(root, "DefaultExperiment"):
-        for name in ("startTime", "stopTime"):
-            if name not in experiment.attrib:
-                raise WiringError(f"{path} has a DefaultExperiment without startTime or stopTime: give both")
-        start, stop_time = (
-            _as_number(experiment.get(name, ""), None, f"{path}: {name}") for name in ("startTime", "stopTime")
-        )
+        if "stopTime" not in experiment.attrib:
+            raise WiringError(f"{path} has a DefaultExperiment without stopTime: it must have one")
+        given = {"startTime": "0"} | experiment.attrib
+        start, stop_time = (_as_number(given[name], None, f"{path}: {name}") for name in ("startTime", "stopTime"))
         if start:
             raise WiringError(f"{path} starts at {start} s: it must start at 0 s")
         for note in experiment.iter():

@@ -116,5 +116,6 @@ def test_start_values_with_units_fit_variables_without_one(folder: Path, tmp_pat
 def test_an_experiment_without_an_end_is_refused(folder: Path, tmp_path: Path) -> None:
     made = write_ssp(system(folder).wiring(), tmp_path / "made.ssp")
     other = rewrite(made, tmp_path / "other.ssp", "SystemStructure.ssd", (' stopTime="0.01"', ""))
-    with pytest.raises(WiringError, match="without startTime or stopTime"):
+    with pytest.raises(WiringError, match="without stopTime"):
         read_ssp(other)
+    assert read_ssp(rewrite(made, other, "SystemStructure.ssd", (' startTime="0.0"', ""))).stop_time == 0.01
