@@ -1,6 +1,6 @@
 """Read systems from SSP archives (System Structure and Parameterization), of this and of other tools.
 
-What the standard has and a `Wiring` has not is refused: systems inside systems, signal dictionaries, and transformations of
+What the standard has and a `Wiring` has not is refused: systems in other files, signal dictionaries, and transformations of
 connections.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import posixpath
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
@@ -130,8 +130,9 @@ def _map(values: Mapping[str, Given], mapping: Node) -> dict[str, Given]:
 
 
 def read_ssp(path: str | Path) -> Wiring:
-    """Read a system from an ``.ssp``: FMUs on one level, connections, start values from ``.ssv`` with names mapped by ``.ssm``.
+    """Read a system from an ``.ssp``: FMUs, connections, start values from ``.ssv`` with names mapped by ``.ssm``.
 
+    The parts of a system inside the system are parts like the others; their names begin with its name, as in ``drive_motor``.
     Start values that match no variable are named in the notes of the wiring.
 
     Raises
@@ -148,46 +149,85 @@ def read_ssp(path: str | Path) -> Wiring:
         if "SystemStructure.ssd" not in archive.namelist():
             raise InputError(f"{path} has no SystemStructure.ssd: it must be an archive of SSP")
         root = _parse(archive.read("SystemStructure.ssd"), f"the SystemStructure.ssd of {path}")
-        (system,) = _below(root, "System")
-        _check_supported(path, system)
-        units, parts, remarks = _units(root), {}, []
-        shared = _Source(archive, units, None).values(system)
-        for name, value in shared.copy().items():
-            # the value of a connector of the system is that of what it is connected to
-            shared |= {str(end): value for end in _inside(system, name)}
-        named = {element.get("name", "") for element in _below(system, "Elements", "Component")}
-        for component in _below(system, "Elements", "Component"):
-            name = component.get("name", "")
-            fmu = _read(archive, component, f"the component {name}")
-            place = folder / hashlib.sha256(fmu).hexdigest()[:12] / posixpath.basename(component.get("source", ""))
-            place.parent.mkdir(parents=True, exist_ok=True)
-            store_file(place, fmu)
-            part = Part.from_fmu(name, place, {})
-            _check_connectors(component, part, units)
-            given = _Source(archive, units, fmu).values(component)
-            # a value at a higher level takes precedence
-            given |= {
-                key.removeprefix(f"{name}."): value for key, value in shared.items() if key.startswith(f"{name}.")
-            }
-            remarks += [
-                f"{name}: {key} of its parameters matches no variable, and is left out"
-                for key in sorted(given.keys() - part.ports)
-            ]
-            values = {key: _number(part, key, given[key]) for key in given if key in part.ports}
-            parts[name] = Part.from_fmu(name, place, values)
-        connectors = {connector.get("name", "") for connector in _below(system, "Connectors", "Connector")}
-        for key in shared:
-            if key.partition(".")[0] not in named and key not in connectors:
-                remarks.append(f"{key} of the system's parameters matches no variable, and is left out")
+        if not (tops := _below(root, "System")):
+            raise InputError(f"the SystemStructure.ssd of {path} has no System: it must have one")
+        _check_supported(path, tops[0])
+        units, systems, parts = _units(root), dict(_systems(tops[0])), {}
+        given: dict[str, Given] = {}
+        for inside, system in systems.items():
+            for component in _below(system, "Elements", "Component"):
+                name = _join(inside, component.get("name", ""))
+                fmu = _read(archive, component, f"the component {name}")
+                place = folder / hashlib.sha256(fmu).hexdigest()[:12] / posixpath.basename(component.get("source", ""))
+                place.parent.mkdir(parents=True, exist_ok=True)
+                store_file(place, fmu)
+                parts[name] = Part.from_fmu(name.replace(".", "_") if inside else name, place, {})
+                _check_connectors(component, parts[name], units)
+                given |= {f"{name}.{key}": v for key, v in _Source(archive, units, fmu).values(component).items()}
+        links = list(_links(systems))
+        for inside, system in reversed(systems.items()):  # values at a higher level take precedence
+            for key, value in _Source(archive, units, None).values(system).items():
+                # that of a connector of the system is that of the inputs and parameters to which it is connected
+                ends = [e for e in _reach(links, End(inside, key), systems) if _causality(parts, e) != "output"]
+                given |= dict.fromkeys([f"{e.part}.{e.port}" for e in ends] or [_join(inside, key)], value)
+    for name in (names := [part.name for part in parts.values()]):
+        if names.count(name) > 1:
+            raise WiringError(
+                f"{path} has two parts {name}: names must be unique, and those of inner systems stand before a _"
+            )
+    known = {f"{name}.{port}": (name, port) for name, part in parts.items() for port in part.ports}
+    values: dict[str, dict[str, float]] = {name: {} for name in parts}
+    for key in given.keys() & known:
+        name, port = known[key]
+        values[name][port] = _number(parts[name], port, given[key])
     stop_time, step = _experiment(path, root)
     return Wiring(
         title=root.get("name", ""),
-        parts=parts,
-        connections=_connections(path, system, parts),
+        parts={part.name: Part.from_fmu(part.name, part.fmu, values[name]) for name, part in parts.items()},
+        connections=_connections(path, links, systems, parts),
         stop_time=stop_time,
         step=step,
-        remarks=tuple(remarks),
+        remarks=tuple(
+            f"the parameter {key} matches no variable, and is left out" for key in sorted(given.keys() - known)
+        ),
     )
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path and name else path or name
+
+
+def _systems(system: Node, path: str = "") -> Iterator[tuple[str, Node]]:
+    """Yield a system and all systems inside it, each with its path of names from the first system."""
+    yield path, system
+    for inner in _below(system, "Elements", "System"):
+        yield from _systems(inner, _join(path, inner.get("name", "")))
+
+
+def _links(systems: Mapping[str, Node]) -> Iterator[tuple[End, End]]:
+    """Yield both ends of each connection by their paths; an end at the edge of a system has the path of the system."""
+    for path, system in systems.items():
+        for c in _below(system, "Connections", "Connection"):
+            yield (
+                End(_join(path, c.get("startElement", "")), c.get("startConnector", "")),
+                End(_join(path, c.get("endElement", "")), c.get("endConnector", "")),
+            )
+
+
+def _reach(links: Sequence[tuple[End, End]], start: End, systems: Container[str]) -> list[End]:
+    """Return the ends at parts that are connected to an end, directly or through edges of systems."""
+    seen, found = [start], []
+    for end in seen:
+        for other in (pair[not n] for pair in links for n in (0, 1) if pair[n] == end):
+            if other.part in systems and other not in seen:
+                seen.append(other)
+            elif other.part not in systems and other != start:
+                found.append(other)
+    return found
+
+
+def _causality(parts: Mapping[str, Part], end: End) -> str:
+    return parts[end.part].ports[end.port].causality if end.part in parts and end.port in parts[end.part].ports else ""
 
 
 def _check_supported(path: str | Path, system: Node) -> None:
@@ -196,21 +236,19 @@ def _check_supported(path: str | Path, system: Node) -> None:
             raise WiringError(
                 f"{path} has a {_tag(node)}, which is not supported: a part of the system must do what it does"
             )
-    for connection in _below(system, "Connections", "Connection"):
-        for change in connection:
+        for change in node if _tag(node) == "Connection" else ():
             if _tag(change) in _TRANSFORMATIONS:
                 raise WiringError(
                     f"{path} has a {_tag(change)} of a connection, which is not supported: a part of the system must do what "
                     "it does"
                 )
-    for element in _below(system, "Elements", "System"):
-        raise WiringError(f"{element.get('name')} is no FMU: a system inside a system is not read")
-    for component in _below(system, "Elements", "Component"):
-        kind, name = component.get("type", "application/x-fmu-sharedlibrary"), component.get("name")
+        if _tag(node) != "Component":
+            continue
+        kind, name = node.get("type", "application/x-fmu-sharedlibrary"), node.get("name")
         if kind != "application/x-fmu-sharedlibrary":
-            raise WiringError(f"{name} is of type {kind}, no FMU: a system inside a system is not read")
-        if component.get("implementation") not in (None, "any", "CoSimulation"):
-            raise WiringError(f"{name} asks for {component.get('implementation')}: a part must be for co-simulation")
+            raise WiringError(f"{name} is of type {kind}, no FMU: systems in other files are not read")
+        if node.get("implementation") not in (None, "any", "CoSimulation"):
+            raise WiringError(f"{name} asks for {node.get('implementation')}: a part must be for co-simulation")
 
 
 def _check_connectors(component: Node, part: Part, units: Mapping[str, Base]) -> None:
@@ -230,38 +268,24 @@ def _check_connectors(component: Node, part: Part, units: Mapping[str, Base]) ->
             )
 
 
-def _ends(system: Node) -> Iterator[tuple[End, End]]:
-    """Yield both ends of each connection; an end at the system's edge has no part."""
-    for c in _below(system, "Connections", "Connection"):
-        yield (
-            End(c.get("startElement", ""), c.get("startConnector", "")),
-            End(c.get("endElement", ""), c.get("endConnector", "")),
-        )
-
-
-def _inside(system: Node, connector: str) -> list[End]:
-    """Return the ends inside a system to which one of its own connectors is connected."""
-    edge = End("", connector)
-    return [other for pair in _ends(system) for end, other in (pair, pair[::-1]) if end == edge and other.part]
-
-
-def _connections(path: str | Path, system: Node, parts: Mapping[str, Part]) -> dict[End, End]:
+def _connections(
+    path: str | Path, links: Sequence[tuple[End, End]], systems: Container[str], parts: Mapping[str, Part]
+) -> dict[End, End]:
     """Return the connections between parts; which end is the input follows from the FMUs, not from the order."""
+    pairs = [pair for pair in links if not any(end.part in systems for end in pair)]
+    pairs = [pair[::-1] if [_causality(parts, e) for e in pair] == ["input", "output"] else pair for pair in pairs]
+    for pair in links:
+        for target, edge in (pair, pair[::-1]):
+            if edge.part in systems and _causality(parts, target) == "input":
+                through = _reach(links, edge, systems)
+                pairs += [(source, target) for source in through if _causality(parts, source) == "output"]
     found: dict[End, End] = {}
-    for source, target in _ends(system):
-        if not (source.part and target.part):
-            continue  # at the edge of the system, where nothing else is
-        kinds = [
-            parts[e.part].ports[e.port].causality
-            for e in (source, target)
-            if e.part in parts and e.port in parts[e.part].ports
-        ]
-        if kinds == ["input", "output"]:
-            source, target = target, source
+    for source, target in pairs:
         if target in found:
             raise WiringError(f"{path}: {target} has two connections: each input must have one")
         found[target] = source
-    return found
+    names = {name: part.name for name, part in parts.items()}
+    return {End(names.get(t.part, t.part), t.port): End(names.get(s.part, s.part), s.port) for t, s in found.items()}
 
 
 def _experiment(path: str | Path, root: Node) -> tuple[float, float]:

@@ -336,7 +336,7 @@ def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
         (text.replace("resources/motor.ssv", "resources/rotor.ssv"), "'resources/rotor.ssv': it must be a file"),
         (text.replace('<ssc:Real unit="rad/s"/>', '<ssc:Real unit="rpm"/>', 1), "is in rpm: it must be in rad/s"),
         (text.replace("<ssd:Connections>", "<ssd:SignalDictionaries/><ssd:Connections>"), "SignalDictionaries"),
-        (text.replace("<ssd:Elements>", '<ssd:Elements><ssd:System name="more"/>', 1), "more is no FMU"),
+        (text.replace("System>", "Syztem>").replace("ssd:System ", "ssd:Syztem "), "has no System"),
         (text.replace('<ssd:ParameterBinding source="resources/motor.ssv"/>',
                       bindings(("", parameters(fieldDrive__mode='<ssv:Real value="0.5"/>'), ""))), "a whole number"),
         (text.replace('<ssd:ParameterBinding source="resources/motor.ssv"/>',
@@ -445,7 +445,44 @@ def test_an_archive_of_another_tool_is_read_by_the_rules_of_the_standard(tmp_pat
     assert values_of(wiring) == {"motor": {"shaft.damping": 0.25}, "linkage": values}
     assert [part.description.modelName for part in wiring.parts.values()] == ["InductionMotor", "FiveBarSlider"]
     left_out = [note for note in wiring.notes() if "left out" in note]
-    assert [note.split(" of ")[0] for note in left_out] == ["linkage: gone", "nowhere.x"]
+    assert [note.split()[2] for note in left_out] == ["linkage.gone", "nowhere.x"]
+
+
+def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
+    """The linkage within a system of its own, whose connectors the outer connections meet; parameters by their paths."""
+    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
+    text = entries["SystemStructure.ssd"].decode()
+    start, end = text.index('<ssd:Component name="linkage"'), text.index("</ssd:Elements>")
+    ports = (("drive.torque", "turn", "input"), ("crank.speed", "w", "output"), ("crank.acceleration", "a", "output"))
+    edges = [f'<ssd:Connector name="{edge}" kind="{kind}"/>' for _, edge, kind in (*ports, ("", "push", "input"))]
+    inside = [
+        f'<ssd:Connection startElement="linkage" startConnector="{port}" endConnector="{edge}"/>'
+        for port, edge, _ in ports
+    ]
+    own = bindings(("", parameters(push='<ssv:Real value="3"/>', linkage__slider__damping='<ssv:Real value="5"/>'), ""))
+    whole = bindings(("", parameters(machine__linkage__slider__damping='<ssv:Real value="7"/>'), ""))
+    inner = (
+        f'<ssd:System name="machine"><ssd:Connectors>{"".join(edges)}</ssd:Connectors><ssd:ParameterBindings>{own}'
+        f"</ssd:ParameterBindings><ssd:Elements>{text[start:end]}</ssd:Elements><ssd:Connections>{''.join(inside)}"
+        '<ssd:Connection startConnector="push" endElement="linkage" endConnector="slider.force"/>'
+        "</ssd:Connections></ssd:System>"
+    )
+    outer = text[end:]
+    for port, edge, _ in ports:
+        outer = outer.replace(f'="{port}"', f'="{edge}"')
+    text = text[:start] + inner + outer.replace('="linkage"', '="machine"')
+    top = f'<ssd:System name="system"><ssd:ParameterBindings>{whole}</ssd:ParameterBindings>'
+    entries["SystemStructure.ssd"] = text.replace('<ssd:System name="system">', top).encode()
+    with zipfile.ZipFile(tmp_path / "nested.ssp", "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    wiring, flat = read_ssp(tmp_path / "nested.ssp"), wiring_of("motor-crank")
+    assert {str(t).replace("machine_", ""): str(s).replace("machine_", "") for t, s in wiring.connections.items()} == {
+        str(t): str(s) for t, s in flat.connections.items()
+    }
+    values = dict(flat.parts["linkage"].values) | {"slider.force": 3.0, "slider.damping": 7.0}
+    assert values_of(wiring) == {"motor": dict(flat.parts["motor"].values), "machine_linkage": values}
+    assert run_system(wiring, stop_time=2e-3).status == 0
 
 
 def test_the_commands(linkwork: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
