@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
@@ -78,13 +79,15 @@ def record_interrupts() -> Iterator[Interrupts]:
 
 
 def check_jobs(n_jobs: int | None) -> None:
-    """Check that a number of workers is not 0.
+    """Check that a number of workers is a whole number, not 0.
 
     Raises
     ------
     InputError
-        If ``n_jobs`` is 0.
+        If it is not.
     """
+    if n_jobs is not None and (isinstance(n_jobs, bool) or not isinstance(n_jobs, Integral)):
+        raise InputError(f"n_jobs is {n_jobs!r}: it must be a whole number of cores, or -1 for all")
     if n_jobs == 0:
         raise InputError("0 cores: give a number of cores, or -1 for all")
 

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 from linkwork.plant import check_tolerance
 
-from ..files import limit, unknown_name
+from ..files import Whole, limit, unknown_name
 from ..mechanisms import InitialState, Parameters
-from ..units import Amount, in_si
+from ..units import Amount, in_si, quantity
 from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published, usual_times
 from .events import Event
 from .inputs import Inputs
@@ -196,12 +196,12 @@ def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: fl
     ParameterError, InputError
         If a setting is not usable.
     """
+    tolerance = quantity(tolerance, "1", "solver.tolerance")
     check_tolerance(tolerance)
     if hold is not None:
         _check_hold(hold, times)
-    if max_steps < 1:
-        raise InputError(f"max_steps is {max_steps}: it must be at least 1")
-    return Settings(times=times, hold=hold or 0.0, tolerance=tolerance, max_steps=max_steps)
+    most = Whole(least=1)(max_steps, "max_steps")
+    return Settings(times=times, hold=hold or 0.0, tolerance=tolerance, max_steps=most)
 
 
 def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:

@@ -240,7 +240,7 @@ def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_t
     # beyond the fold there is none, within it there is
     words = [len(find_orbits(LIGHT, speed=fold * (1.0 + away), turns=4)) for away in (-1e-4, 1e-4)]
     assert words == [2, 0]
-    with pytest.raises(InputError, match="turns is 0"):
+    with pytest.raises(ParameterError, match="turns is 0"):
         with_isolas(response, turns=0)
 
 

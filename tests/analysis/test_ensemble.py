@@ -501,6 +501,7 @@ def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
         ({"batch": 0}, ParameterError, "batch is 0"),
         ({"batches": 2}, InputError, "no argument 'batches' of simulate_many; did you mean batch"),
         ({"n_jobs": 0}, InputError, "0 cores"),
+        ({"n_jobs": 1.5}, InputError, r"n_jobs is 1\.5"),
         ({"batch": 2.5}, ParameterError, "batch is 2.5"),
         ({"outputs": ["crank.angel"]}, InputError, "there is no output 'crank.angel'; did you mean crank.angle"),
         ({"step": -1.0}, InputError, "step is -1.0 s"),

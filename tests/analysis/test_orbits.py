@@ -22,7 +22,7 @@ from analysis.periodic import (
 from analysis.periodic.motion.kernels import eliminate
 from analysis.periodic.motion.orbit import _time
 from analysis.units import RAD_S_PER_RPM
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, without_friction
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -259,13 +259,15 @@ def test_a_crank_that_stalls_is_reported() -> None:
         ({"speed": 1.0, "start": (0.0, float("nan"))}, "must be 2 finite numbers"),
         ({"speed": 1.0, "turns": 0}, "turns is 0"),
         ({"speed": 1.0, "turns": 1.5}, r"turns is 1\.5"),
+        ({"speed": 1.0, "turns": "two"}, "turns is 'two'"),
+        ({"speed": 1.0, "start": "rest"}, "must be 2 finite numbers"),
         ({"speed": 1.0, "initial": 3.0}, "initial is"),
         ({"inputs": Inputs(speed=1.0, shift_speed=1.0)}, "no input 'shift_speed'"),
         ({"inputs": Inputs(speed=1.0, force=ramp(0.0, 1.0, 0.0, 1.0))}, "force is a Piecewise"),
     ],
 )
 def test_bad_input(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(LinkworkError, match=message):
         find_orbit(TABLE_3_1, **arguments)  # type: ignore[arg-type]
 
 

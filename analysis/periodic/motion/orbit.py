@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
 from ...display import NotebookResult, format_count, format_rounds
-from ...files import unknown_name
+from ...files import Whole, unknown_name
 from ...mechanisms import Parameters, find_mechanism
 from ...numerics.continuation import Evaluation
 from ...run import compute_outputs, takes_published
@@ -612,7 +612,10 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
         free = len(flow.free)
         guess[free : 2 * free] = mean_rates(drive, flow, guess)
     else:
-        guess = np.array(start, dtype=float)
+        try:
+            guess = np.array(start, dtype=float)
+        except (TypeError, ValueError):  # no numbers
+            guess = np.empty(0)
         if guess.shape != (flow.size,) or not np.isfinite(guess).all():
             names = ", ".join(f"{label} [{unit}]" for label, (_, unit) in zip(flow.labels, flow.components))
             raise InputError(f"start is {start}: it must be {flow.size} finite numbers, {names}")
@@ -649,13 +652,12 @@ def rest_guess(
 
 
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
-    """Raise InputError if a period cannot have this number of turns.
+    """Raise InputError or ParameterError if a period cannot have this number of turns.
 
     A mechanism with a degree of freedom driven by a groove, for example, may need several turns to return to its configuration.
     This is checked if an operating point and a start are given.
     """
-    if turns < 1 or turns != int(turns):
-        raise InputError(f"turns is {turns}: it must be a whole number, at least one")
+    Whole(least=1)(turns, "turns")
     if point is None or start is None:
         return
     mechanism, flow = point.mechanism, point.flow

@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 
 from ...display import NotebookResult, format_count
+from ...files import Whole
 from ...mechanisms import InitialState, Parameters, find_mechanism
 from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
@@ -473,10 +474,12 @@ def search_orbits(
     Motions in which an undriven link goes round are sought, too: one link at a time, at most once per turn of the crank. If the
     drive has a ratio for the link, only motions with this ratio are sought.
     """
-    if not isinstance(turns, int):
-        return join_orbits(
-            [search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
-        )
+    if isinstance(turns, Sequence) and not isinstance(turns, str):
+        numbers = sorted({Whole(least=1)(number, "turns") for number in turns})
+        if not numbers:
+            raise ParameterError("turns", turns, "have at least one number")
+        return join_orbits([search_orbits(parameters, drive, turns=number, start=start) for number in numbers])
+    turns = Whole(least=1)(turns, "turns")
     mechanism, known = find_mechanism(parameters), list(known)
     flow, ratios = drive.flow(mechanism), drive.ratios_by_freedom(mechanism)
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]

@@ -24,7 +24,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ...display import NotebookResult, format_count
-from ...files import write_csv
+from ...files import Whole, write_csv
 from ...mechanisms import Parameters, find_mechanism
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
@@ -340,6 +340,7 @@ def frequency_response(
         drive = motion.Drive(speed=low)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
+    doublings = Whole(least=0)(doublings, "doublings")
     family = motion.Family(parameters=parameters, drive=drive, vary=vary)
     with record_interrupts() as interrupted, show_progress(progress, high - low, "following the response") as show:
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
