@@ -17,6 +17,7 @@ from linkwork.errors import InputError, Interrupted
 from ..display import format_count
 from ..synthesis import (
     QUICK_SEARCH,
+    UNITS,
     USUAL,
     Constraint,
     CrankUnknown,
@@ -30,6 +31,7 @@ from ..synthesis import (
     Task,
     synthesize,
 )
+from ..units import Amount, in_si, si
 
 Criterion = Literal["error", "worst"]
 
@@ -101,17 +103,18 @@ class StrategyInterrupted(Interrupted):
         super().__init__(f"stopped after {len(strategy.steps) if strategy else 0} mechanisms")
 
 
+@in_si(bounds=UNITS, stroke="m", second_crank="m")
 def simplest_mechanism(
     task: Task,
-    tolerance: float,
+    tolerance: Amount,
     *,
     criterion: Criterion = "error",
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
     constraints: Sequence[Constraint] = USUAL,
-    stroke: float | None = None,
+    stroke: Amount = None,
     harmonics: int = 3,
     ratios: Sequence[int] = RATIOS,
-    second_crank: float | None = None,
+    second_crank: Amount = None,
     search: Search = QUICK_SEARCH,
 ) -> Strategy:
     """Find the simplest mechanism whose error is within a tolerance, without circuit, branch or order defect.
@@ -150,10 +153,12 @@ def simplest_mechanism(
     StrategyInterrupted
         On Ctrl-C, with the steps so far.
     """
-    if not (isfinite(tolerance) and tolerance > 0.0):
-        raise InputError(f"tolerance is {tolerance}: it must be a finite number greater than zero")
     if criterion not in ("error", "worst"):
         raise InputError(f"criterion {criterion!r}: it must be 'error' or 'worst'")
+    unit = ("rad" if isinstance(task, RockerFunction) else "m") + "**2" * (criterion == "error")
+    tolerance = si(tolerance, unit, "tolerance")
+    if not (isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"tolerance is {tolerance}: it must be a finite number greater than zero")
     for name, value in (("harmonics", harmonics), ("starts", search.starts)):
         if not (float(value).is_integer() and value >= 1):
             raise InputError(f"{value} {name}: it must be a whole number, at least one")

@@ -37,6 +37,7 @@ from linkwork.errors import AssemblyError, InputError, ParameterError
 
 from ..numerics.fourier import FourierSeries
 from ..synthesis import Linkage, SecondCrank
+from ..units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
 
@@ -258,14 +259,15 @@ class _Problem:
         return position, at_c, direction, there
 
 
+@in_si(guide_angle="rad", stroke="m", least_transmission="rad")
 def variational_motion(
     linkage: Linkage,
     rotation: ArrayLike,
     target: ArrayLike,
     *,
-    guide_angle: float = 0.0,
-    stroke: tuple[float, float] = (-inf, inf),
-    least_transmission: float = 0.0,
+    guide_angle: Amount = 0.0,
+    stroke: tuple[Amount, Amount] = (-inf, inf),
+    least_transmission: Amount = 0.0,
     assemblies: tuple[int, ...] | None = None,
     weights: ArrayLike | None = None,
     continuous: bool = False,

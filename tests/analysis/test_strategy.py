@@ -213,6 +213,9 @@ def test_constraints_without_even_a_four_bar() -> None:
     [
         (0.0, {}, "tolerance is 0.0"),
         (float("nan"), {}, "tolerance is nan"),
+        ("-1 mm^2", {}, "tolerance is -1e-06"),
+        ("-1 mm", {"criterion": "worst"}, "tolerance is -0.001"),
+        (1.0, {"stroke": "-5 mm"}, "stroke is -0.005 m"),
         (1.0, {"criterion": "best"}, "criterion 'best'"),
         (1.0, {"harmonics": 0}, "0 harmonics"),
         (1.0, {"search": Search(starts=0)}, "starts"),
@@ -225,7 +228,7 @@ def test_constraints_without_even_a_four_bar() -> None:
     ],
 )
 def test_bad_input_is_named_before_anything_is_searched(
-    monkeypatch: pytest.MonkeyPatch, tolerance: float, options: dict[str, Any], words: str
+    monkeypatch: pytest.MonkeyPatch, tolerance: float | str, options: dict[str, Any], words: str
 ) -> None:
     monkeypatch.setattr(strategy_module, "synthesize", lambda *_, **__: pytest.fail("searched"))
     task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))

@@ -504,7 +504,7 @@ class TestRefusals:
             ([0.0, 1.0], np.zeros(2), {"weights": [1.0]}, r"weights of shape \(1,\)"),
             ([0.0, 1.0], np.zeros(2), {"weights": [1.0, -1.0]}, "weights"),
             ([0.0, 1.0], np.zeros(2), {"guide_angle": nan}, "guide_angle"),
-            ([0.0, 1.0], np.zeros(2), {"stroke": (1.0, 0.0)}, "stroke"),
+            ([0.0, 1.0], np.zeros(2), {"stroke": ("1 m", "0 mm"), "guide_angle": "40 deg"}, "stroke"),
             ([0.0, 1.0], np.zeros(2), {"stroke": (nan, 0.0)}, "stroke"),
             ([0.0, 1.0], np.zeros(2), {"least_transmission": 1.6}, "least_transmission"),
             ([0.0, 1.0], np.zeros(2), {"assemblies": ()}, "assemblies"),
