@@ -28,7 +28,7 @@ from .table import TWISTS_REACHED_DEG, Case
 #: Rows and columns of the entries 21, 31 and 32, the right sides of eqs 20.
 _BELOW = ([1, 2, 2], [0, 0, 1])
 #: Shifts (in) at which the iteration is tried, runs at each, and differences of their starts (rad, in).
-TRIED, RUNS, OFF = np.arange(0.0, 11.5, 0.5), 20, 1e-9
+TRIED, RUNS, OFF = np.arange(0.0, 12.5, 0.5), 20, 1e-9
 #: Differential operator of a rotation about k, eqs 2a and 3a.
 _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -188,7 +188,7 @@ def _limits() -> tuple[Statement, ...]:
         while _settles_with_twist(found + way):
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
-    place, step = text("section 3.2, L1121"), "0.5 in, the step in which S1 is tried"
+    place, step = text("section 3.2, L1121"), "0.5 in, the step in which S1 is tried and the stated limits are given"
     no_offset, increased, twist = (
         Statement(
             "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
@@ -200,7 +200,7 @@ def _limits() -> tuple[Statement, ...]:
             step,
             (near("a4 = 0", "1.5", last[0.0], 0.5, "in"),),
             "rounding errors decide: the share of runs that settle is "
-            + ", ".join(f"{shares[0.0][s1]:.0%} at {s1:g} in" for s1 in (1.0, 1.5, 2.0)),
+            + ", ".join(f"{shares[0.0][s1]:.0%} at {s1:g} in" for s1 in (0.5, 1.0, 1.5, 2.0)),
         ),
         Statement(
             "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
@@ -214,7 +214,8 @@ def _limits() -> tuple[Statement, ...]:
                 near("fails beyond, a4 = 20 in, which is greater than 10 in", "3.5", last[20.0], 0.5, "in"),
                 near("converges up to, a4 = 30 in", "9", always, 0.5, "in"),
             ),
-            f"at a4 = 10 in every run settles at 4 in, and {shares[10.0][4.5]:.0%} at 4.5 in",
+            f"at a4 = 10 in every run settles at 4 in, and {shares[10.0][4.5]:.0%} at 4.5 in; at a4 = 20 in every run "
+            f"settles up to 6 in, and {shares[20.0][11.0]:.0%} at 11 in",
         ),
         Statement(
             "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "

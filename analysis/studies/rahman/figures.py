@@ -60,15 +60,16 @@ FloatArray = NDArray[np.float64]
 #: Text at the head of the figures.
 FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
 matrices. From this it finds velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Most of its
-algebra is right: the matrices and operators, the accelerations except 38a, the momenta except for two symbols, their rates, and
-the inertia forces. In the plane, its forces agree with Newton and Euler once errata 5 and 6 are mended.
+algebra is right: the matrices and operators, the accelerations except 38a, the momenta, their rates, and the inertia forces;
+in five equations a symbol is uncertain in our scan (erratum 9). In the plane, its forces agree with Newton and Euler once
+errata 5 and 6 are mended.
 
 Out of the plane the method fails. A ball joint has three rotations, but eqs 2 and 3 give it two (erratum 1). The chain
 therefore has one freedom, and crank angle and shift cannot both be given. The iteration stops where its steps become small,
 on loops that are open by up to 38 deg, with the slider wrong by up to 6 in. If we add the steps of Davidon, Fletcher and
 Powell in our own way, the loops stay open too. The limits of S1 and alpha4 within which "the program converges" are limits of
 this iteration, not of the mechanism, and we find the same except at a4 = 10 and 20 in. Without an offset, rounding errors
-decide from 1 to 2 in. The mechanism works far beyond these limits. Its greatest shift falls with the offset, although the
+decide from 0.5 to 2 in. The mechanism works far beyond these limits. Its greatest shift falls with the offset, although the
 thesis infers that it rises. The thesis sets the axial force on the crank to zero, but this force is an unknown (erratum 7).
 Therefore 2F2k is not zero, and the printed bearing moments 1T1i and 1T1j lack a part.
 

@@ -23,7 +23,6 @@ from .method import (
     AT_RATES,
     CLEAR_SINE,
     DOTS,
-    MAYBE,
     MOVING,
     PLANE,
     ROD,
@@ -35,6 +34,7 @@ from .method import (
     draw,
     joints,
     links,
+    unsure,
 )
 from .printed import (
     CRANK_AT_SPEED,
@@ -229,9 +229,8 @@ def _momenta() -> tuple[Statement, ...]:
                     "lb.s",
                 ),
                 nothing("eq 51a, components i and k", [wrong.real[[0, 2]], wrong.dual[[0, 2]]], "lb.s"),
-                nothing("eq 51a, component j", [wrong.real[1], wrong.dual[1]], "lb.s"),
+                unsure("eq 51a, component j", "cos theta3 for cos eta3", [wrong.real[1], wrong.dual[1]], "lb.s"),
             ),
-            f"erratum 9: cos theta3 for cos eta3 in 51a, {MAYBE}",
         ),
         Statement(
             "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
@@ -240,10 +239,9 @@ def _momenta() -> tuple[Statement, ...]:
             "for eq 53a and 0 for eq 52a (L1089)",
             ROUNDING,
             (
-                nothing("eq 52a", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
+                unsure("eq 52a", "g3 for g2", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
                 nothing("eq 53a", difference(slider_53a, at_g3.momentum(moving[2])), "lb.s"),
             ),
-            f"erratum 9: g3 for g2 in 52a, {MAYBE}",
         ),
         Statement(
             "In either case [all by the forward path, or some by the backward path], the same numerical results are "
@@ -404,7 +402,7 @@ def _expansion_differences() -> dict[str, FloatArray]:
 
 def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
     """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q; ``general`` are its forces in a general position."""
-    unsolved = _solution_residuals()
+    unsolved, (slip, *expanded) = _solution_residuals(), _expansion_differences().items()
     # 63d is the moment about j, 63e the force along k
     unmet = unsolved[1, [1, 0], [1, 2]]
     unsolved[1, [1, 0], [1, 2]] = 0.0
@@ -416,8 +414,10 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "difference from eqs 62 to 64, evaluated with the matrices of eqs 1 to 3 for arbitrary forces and moments in a "
             "general position, lengths in inches",
             ROUNDING,
-            tuple(nothing(words, size, "lb") for words, size in _expansion_differences().items()),
-            f"erratum 9: 1F1j for 1F1i in 62c, {MAYBE}",
+            (
+                unsure(slip[0], "1F1j for 1F1i", slip[1], "lb"),
+                *(nothing(words, size, "lb") for words, size in expanded),
+            ),
         ),
         Statement(
             "There are eighteen equations out of which one does not give any solution (equation (63b)), since it is "

@@ -7,13 +7,14 @@ quotients, and the model by Newton's and Euler's equations. The errata are numbe
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from linkwork.slider_crank.published import parameters
 
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...numerics.dual import Dual, about_i, about_j, about_k
 from ..rules import ABOUT_DEG
+from ..statements import Case as Judged
 from ..study import StudyResult
 from ..variation import cache
 from .figures import ALL, ANGLE, clear_mask, printed, printed_symbol
@@ -40,8 +41,6 @@ CLEAR_SINE = float(np.sin(np.radians(ABOUT_DEG)))
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
 DOTS = "second derivatives that have one dot in our scan are read with two"
-#: Remark on an error of one character, which may be our scan's.
-MAYBE = "at least in our scan; the printed thesis may be right"
 #: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
 
@@ -78,6 +77,16 @@ def links() -> tuple[Dual, Dual, Dual]:
 def difference(a: Dual, b: Dual) -> float:
     """Return the greatest difference between the entries of two dual vectors or matrices."""
     return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
+
+
+def unsure(label: str, slip: str, size: ArrayLike, unit: str) -> Judged:
+    """Return a case that cannot be judged, because our scan alone may have a wrong symbol in an equation.
+
+    ``slip`` says what the scan has in the place of what is right, ``size`` is the difference that this makes.
+    """
+    most = float(np.max(np.abs(size)))
+    why = f"our scan has {slip}, a difference of {most:.4g} {unit}; the printed thesis may be right (erratum 9)"
+    return Judged(label=label, computed=None, why=why)
 
 
 #: Labels of the axes by the unit of their columns.

@@ -134,9 +134,8 @@ def _solved() -> tuple[Statement, ...]:
             ROUNDING,
             (
                 nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
-                nothing("right side of row 6", eq_38[5, 5], "in/s"),
+                method.unsure("right side of row 6", "sin theta2 for sin theta2 sin eta2", eq_38[5, 5], "in/s"),
             ),
-            f"erratum 9: sin theta2 lacks the factor sin eta2, {method.MAYBE}",
         ),
         Statement(
             "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
@@ -185,10 +184,9 @@ def _derivatives() -> tuple[Statement, ...]:
         Statement(
             "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
             text("section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of"),
-            "S1' by eq 28a less the rate of eq 28, at theta1 = 0.9 rad with alpha = 2 and an amplitude of 2 in",
+            "S1' by eq 28a minus the rate of eq 28, at theta1 = 0.9 rad with alpha = 2 and an amplitude of 2 in",
             ROUNDING,
-            (nothing("eq 28a", of_28a, "in/s"),),
-            f"erratum 9: S1 for its amplitude S_S1, {method.MAYBE}",
+            (method.unsure("eq 28a", "S1 for its amplitude S_S1", of_28a, "in/s"),),
         ),
         Statement(
             "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",

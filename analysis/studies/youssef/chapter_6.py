@@ -150,7 +150,7 @@ def _ellipse_b() -> tuple[Statement, ...]:
 
 def _bounded() -> tuple[Statement, ...]:
     p = PROBLEMS["ellipse-a-bounded"]
-    (least, greatest), (least_a, greatest_a) = rounding_range("ellipse-a-bounded")[""], rounding_range("ellipse-a")[""]
+    (_, least, greatest), (_, least_a, greatest_a) = rounding_range("ellipse-a-bounded"), rounding_range("ellipse-a")
     increases = least - greatest_a, greatest - least_a
 
     def outside(linkage: Linkage) -> int:

@@ -42,7 +42,8 @@ error is greater than with the pivot fixed. The printed series for path (b) is w
 **What cannot be told.** Series 1 (Fig 7.4 to 7.10) rests on a desired curve that is lost. We draw its figures with a curve of
 our own, and give no verdict on what the thesis says about the lost curve. For a mechanism that corrects itself, the thesis
 states neither the adjustment nor the criterion. Methods that are only named, such as teach-in, latches or further inputs,
-have no example to judge.
+have no example to judge. Remarks on the field and on the choice of a method (L5171 to 5201, 5276 to 5289, 5331, 5393, 5782,
+5877, 5892) claim nothing that can be measured, and have no verdict.
 """
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -62,8 +62,8 @@ def compute_pulses() -> StudyResult:
                 "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
                 "within the crank cycle.",
                 text("8.2.1.2, L6255"),
-                "range of the crank speed over a turn by the times from hole to hole, as which we read the widths, relative "
-                "to the true range",
+                "range of the crank speed over a turn, computed from the times from hole to hole (our reading of *width*), "
+                "relative to the true range",
                 f"{READ:g}, the rule for what is read from a graph",
                 tuple(
                     near(

@@ -80,7 +80,7 @@ def compute() -> StudyResult:
                 "illegible)",
                 (
                     at_most(
-                        f"off straight, on {CM_PER_METRE * printed.travel:.0f} cm",
+                        f"extent in y over extent in x, {CM_PER_METRE * printed.travel:.0f} cm",
                         ALIKE,
                         printed.flatness / printed.travel,
                     ),

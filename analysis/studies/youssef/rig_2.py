@@ -424,8 +424,8 @@ def compute_harmonics() -> StudyResult:
                 "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
                 "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
                 text("8.4.2.2, L6871"),
-                "rise of the amplitude to the maximum there from the next minimum, relative to this minimum; 0 if the "
-                "curve, in steps of at most 6 rpm, has no maximum",
+                "maximum of the amplitude there minus the minimum that follows at a higher speed, relative to this minimum; "
+                "0 if the curve, in steps of at most 6 rpm, has no maximum",
                 rigs.SEEN_IN_RECORDS,
                 tuple(
                     at_most(f"spring {spring}, {part}", rigs.NOTICED, rigs.peak_rise(spring, n))
@@ -444,7 +444,7 @@ def compute_harmonics() -> StudyResult:
                 "equation, corrected. What the experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", _greatest(s, 1) / _greatest(s, 2), ABOUT * 50.0) for s in "CD"),
-                "(4.21) as printed cannot be solved for a coupler with mass: the scan garbles its terms",
+                "the equation is corrected because the terms of (4.21) for a coupler with mass are illegible in our scan",
             ),
         ),
     )

@@ -172,7 +172,7 @@ def maximum_near_fraction(spring: str, order: int) -> tuple[float, float]:
 
 
 def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
-    """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the next minimum.
+    """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the minimum that follows.
 
     ``stiffness`` is that of the spring (N/m).
     """
@@ -183,7 +183,7 @@ def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
 
 
 def peak_rise(spring: str, order: int) -> float:
-    """Return the amplitude's maximum near 1/order of the natural frequency divided by the next minimum, minus 1.
+    """Return the amplitude's maximum near 1/order of the natural frequency divided by the minimum that follows, minus 1.
 
     The result is 0 without such a maximum.
     """

@@ -221,7 +221,7 @@ def _rocker() -> tuple[Statement, ...]:
     return (
         Statement(
             "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
-            "direct search method 'the simplex' will be considered here.",
+            'direct search method "the simplex" will be considered here.',
             text("7.3.2, L5915-5919"),
             "number of equations less that of unknowns: the method takes the error at one crank angle, (7.4), so that (7.6) "
             f"is an equation for the slider's position at each of the {angles} crank angles that we read at Fig 6.7; the "

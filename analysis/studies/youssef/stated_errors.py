@@ -7,7 +7,8 @@ from itertools import product
 from math import radians
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
 
 from ...synthesis import Linkage, RockerFunction, UntimedPath, evaluate
 from ...units import CM_PER_METRE
@@ -72,34 +73,38 @@ def half_units(linkage: Linkage) -> FloatArray:
     return si * [0.5 * 10.0 ** int(x.as_tuple().exponent) if x else 0.0 for x in digits]
 
 
-def rounding_range(name: str) -> dict[str, tuple[float, float]]:
-    """Return the least and the greatest error that a printed linkage can have, for each reading (see `errors_by_reading`).
+def rounding_range(name: str) -> tuple[str, float, float]:
+    """Return the reading that comes nearest to the stated error, and the least and the greatest error that it allows.
 
-    Each printed dimension may be off by up to half a unit of its last digit.
+    The readings are those of `errors_by_reading`. Each printed dimension may be off by up to half a unit of its last digit.
     """
     p = PROBLEMS[name]
-    off = half_units(p.linkage)
+    assert p.error is not None
+    off, stated = half_units(p.linkage), p.error
     if isinstance(p.task, UntimedPath):
         # the crank's phase does not change the curve
         off[8] = 0.0
-    # the extremes of a nearly linear change are at the corners, or near the middle
-    corners = {tuple(off * signs) for signs in product((-1.0, 1.0), repeat=len(off))} | {(0.0,) * len(off)}
-    errors = [
-        errors_by_reading(name, Linkage.from_vector(p.linkage.vector + np.array(change), 1)) for change in corners
-    ]
-    return {reading: (min(e[reading] for e in errors), max(e[reading] for e in errors)) for reading in errors[0]}
+
+    def errors(change: ArrayLike) -> dict[str, float]:
+        return errors_by_reading(name, Linkage.from_vector(p.linkage.vector + off * np.asarray(change), 1))
+
+    # the greatest error is at a corner, the least near one or near the middle
+    signs = [(-1.0, 1.0) if half else (0.0,) for half in off]
+    found = {corner: errors(corner) for corner in {*product(*signs), (0.0,) * len(off)}}
+    spans = {r: (min(e[r] for e in found.values()), max(e[r] for e in found.values())) for r in errors(0.0 * off)}
+    reading = min(spans, key=lambda r: abs(float(np.clip(stated, *spans[r])) - stated))
+    start = min(found, key=lambda corner: found[corner][reading])
+    least = minimize(lambda change: errors(change)[reading], start, method="L-BFGS-B", bounds=[(-1.0, 1.0)] * len(off))
+    return reading, float(least.fun), float(spans[reading][1])
 
 
 def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives the stated value") -> Case:
-    """Judge whether a stated error lies in one of the ranges of `rounding_range`; the range nearest to the error counts."""
-    ranges, wanted = rounding_range(name), float(stated)
-    nearest = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
-    reading = min(nearest, key=lambda r: abs(nearest[r] - wanted))
-    least, greatest = ranges[reading]
+    """Judge whether a stated error lies in the range of `rounding_range`."""
+    reading, least, greatest = rounding_range(name)
     return near(
         f"{label}{reading}; rounded up or down {least:.2f} to {greatest:.2f}",
         stated,
-        nearest[reading],
+        np.clip(float(stated), least, greatest),
         unit=PROBLEMS[name].unit,
         why=why,
     )
