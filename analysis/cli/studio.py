@@ -88,13 +88,15 @@ def _open(address: str) -> None:
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     from ..files import read_tables, unknown_name
-    from ..run import load_case, read_case
+    from ..run import load_case, published_case, read_case
     from ..studio import opening_state, page_state
 
     if what is None:
         if overrides:
             raise click.UsageError("--set changes a case or a published set: name one")
         return opening_state()
+    if what in PUBLISHED and not overrides:
+        return page_state(published_case(what))
     if what in PUBLISHED:
         return page_state(read_case({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
     if not Path(what).is_file():

@@ -19,7 +19,9 @@ from math import inf
 from typing import Any
 
 from linkwork.errors import InputError, LinkworkError
+from linkwork.mechanism import Mechanism
 
+from ..mechanisms import MECHANISMS
 from ..numerics.workers import end_when_orphaned
 from ..run import progress_listener
 
@@ -87,7 +89,7 @@ class Worker:
             self._job = {"state": "running", "job": self._number, "kind": kind, "what": "starting", "share": 0.0}
             try:
                 self.start()
-                self._pipe.send((self._number, kind, dict(request)))
+                self._pipe.send((self._number, kind, dict(request), _mechanism(request)))
             except OSError:
                 self._lost(_LOST)
             except LinkworkError as error:
@@ -142,6 +144,13 @@ class Worker:
             self._folder = ""
 
 
+def _mechanism(request: Mapping[str, Any]) -> Mechanism | None:
+    """Return the mechanism of a job's state, which another process must get to know if it is described; None if unknown."""
+    state = request.get("state")
+    name = state.get("mechanism") if isinstance(state, Mapping) else None
+    return MECHANISMS.get(name) if isinstance(name, str) else None
+
+
 def _work(pipe: Any, caller: int, folder: str) -> None:
     """Run one job after another in the worker's process until it is killed."""
     end_when_orphaned(caller)
@@ -154,7 +163,9 @@ def _work(pipe: Any, caller: int, folder: str) -> None:
 
     with suppress(EOFError, OSError):
         while True:
-            number, kind, request = pipe.recv()
+            number, kind, request, mechanism = pipe.recv()
+            if mechanism is not None:
+                MECHANISMS.setdefault(mechanism.name, mechanism)
             pipe.send((number, _answer(do, kind, request, _Teller(pipe, number))))
 
 

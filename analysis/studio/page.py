@@ -9,13 +9,12 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from linkwork import __version__
 from linkwork.errors import InputError
-from linkwork.mechanism import Mechanism
 
 from ..export import SOURCES
 from ..files import write_text
@@ -42,6 +41,7 @@ _MADE_OF = (
     "studio/*.*",
     "studio/src/*",
 )
+_SCRIPT = r'(<script type="application/json" id="{}">)(.*?)(</script>)'
 _HASH = '<meta name="sources" content="{}">'
 
 
@@ -59,36 +59,26 @@ def is_current() -> bool:
     return _HASH.format(hash_of_sources()) in PAGE.read_text(encoding="utf-8")
 
 
-def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | None = None) -> str:
-    """Return the HTML of the page with mechanisms, which Zig compiles to WebAssembly.
-
-    Parameters
-    ----------
-    template : str, optional
-        HTML of a page whose mechanisms are replaced; by default the page that `npm run build` wrote.
-    mechanisms : iterable of Mechanism, optional
-        By default all registered mechanisms.
+def build_page() -> str:
+    """Return the HTML of the page that `npm run build` wrote with all registered mechanisms, which Zig compiles to WebAssembly.
 
     Raises
     ------
     InputError
         If `npm run build` has not written its page.
     """
-    if template is None:
-        if not TEMPLATE.is_file():
-            raise InputError(f"{TEMPLATE} is not there: npm run build in {TEMPLATE.parents[1]} writes it")
-        template = TEMPLATE.read_text(encoding="utf-8").replace(
-            "<title>", f"{_HASH.format(hash_of_sources())}\n<title>", 1
-        )
-    made = MECHANISMS.values() if mechanisms is None else mechanisms
-    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": [mechanism_tables(m) for m in made]}
+    if not TEMPLATE.is_file():
+        raise InputError(f"{TEMPLATE} is not there: npm run build in {TEMPLATE.parents[1]} writes it")
+    template = TEMPLATE.read_text(encoding="utf-8").replace("<title>", f"{_HASH.format(hash_of_sources())}\n<title>", 1)
+    made = [mechanism_tables(m) for m in MECHANISMS.values()]
+    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": made}
     return _replace_script(_replace_script(template, "tables", tables), "state", opening_state())
 
 
 def make_page(state: Mapping[str, Any]) -> str:
     """Return the HTML of the built page with an opening state.
 
-    If the built page lacks the mechanism of this state, the returned page has this mechanism only.
+    If the built page lacks the mechanism of this state, the returned page has this mechanism beside its own.
 
     Raises
     ------
@@ -97,7 +87,9 @@ def make_page(state: Mapping[str, Any]) -> str:
     """
     page = PAGE.read_text(encoding="utf-8")
     if f'"name":"{state["mechanism"]}"' not in page:
-        page = build_page(page, [MECHANISMS[state["mechanism"]]])
+        tables = json.loads(re.search(_SCRIPT.format("tables"), page, re.DOTALL)[2])  # type: ignore[index]
+        tables["mechanisms"].append(mechanism_tables(MECHANISMS[state["mechanism"]]))
+        page = _replace_script(page, "tables", tables)
     return _replace_script(page, "state", state)
 
 
@@ -120,5 +112,4 @@ def main() -> None:
 def _replace_script(page: str, script: str, data: Any) -> str:
     """Return the page with ``data`` in the JSON script whose id is ``script``."""
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    pattern = rf'(<script type="application/json" id="{script}">).*?(</script>)'
-    return re.sub(pattern, lambda found: found[1] + text + found[2], page, count=1, flags=re.DOTALL)
+    return re.sub(_SCRIPT.format(script), lambda found: found[1] + text + found[3], page, count=1, flags=re.DOTALL)

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..files import unknown_name
 from ..libraries import MissingLibraryError
-from ..mechanisms import PUBLISHED
-from ..run import Case, read_case
+from ..run import Case, published_case
 from .page import make_page
 from .state import opening_state, page_case, page_state
 
@@ -48,9 +46,7 @@ class Widget(anywidget.AnyWidget):
 
     def __init__(self, what: Case | str | None = None, *, height: int = 900) -> None:
         if isinstance(what, str):
-            if what not in PUBLISHED:
-                raise unknown_name(what, PUBLISHED, f"published set {what!r}")
-            what = read_case({"published": what}, folder=Path(), title=what)
+            what = published_case(what)
         state = opening_state() if what is None else page_state(what)
         super().__init__(state=state, page=make_page(state), height=height)
 

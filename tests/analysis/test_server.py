@@ -30,7 +30,7 @@ import pytest
 from analysis.cli.studio import _open as open_page
 from analysis.export import PLATFORMS, this_platform
 from analysis.mechanisms import MECHANISMS, PUBLISHED
-from analysis.run import progress_listener, read_case, simulate
+from analysis.run import load_case, progress_listener, read_case, simulate
 from analysis.server import BODY, TOKEN, Server, Worker, application
 from analysis.server.application import allowed_hosts
 from analysis.server.jobs import JOBS, do
@@ -316,6 +316,17 @@ def test_jobs_fail_in_a_sentence_come_one_at_a_time_and_stop_where_they_are_canc
         last = server.worker._process
         assert last.is_alive()
     assert not last.is_alive()
+
+
+@pytest.mark.slow
+def test_jobs_are_done_for_a_described_linkage(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "linkages" / "elastic-bearing.toml"
+    case = load_case(example)
+    for server in _running(PAGE_TEXT):
+        assert _job(server, "POST", kind="run", state=page_state(case), wanted={"rows": 10})[0] == 202
+        answer = json.loads(_until(server, "done")["answer"])
+        wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time)
+        assert answer["outputs"]["across.position"][-1] == pytest.approx(wanted["across.position"][-1], abs=1e-9)
 
 
 @pytest.mark.parametrize(

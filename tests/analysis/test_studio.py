@@ -20,6 +20,7 @@ from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, fi
 from analysis.periodic import Drive, newton_orbit
 from analysis.run import Case, Inputs, read_case, simulate
 from analysis.studio import PAGE, is_current, make_page, opening_state, page_state
+from analysis.studio.tables import published_values
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from tests import slider_cranks, strategies
@@ -118,6 +119,15 @@ def test_a_case_is_a_state_of_the_page(linkwork: Callable[..., Result], tmp_path
     assert state["values"]["slider.stiffness"] == pytest.approx(2000.0, rel=1e-14)
     assert state["values"]["drive.speed"] == PUBLISHED["table-3.1"].crank_speed
     assert state["values"]["drive.mode"] == 1.0
+
+
+def test_a_published_set_opens_as_in_the_list_of_the_page(linkwork: Callable[..., Result], tmp_path: Path) -> None:
+    assert linkwork("studio", "table-3.1", "--out", "page.html").exit_code == 0
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    state = json.loads(text.split('id="state">')[1].split("</script>")[0])
+    known = PUBLISHED["table-3.1"]
+    assert state["title"] == known.source
+    assert published_values(find_mechanism(known.parameters), known).items() <= state["values"].items()
 
 
 @pytest.mark.parametrize(
@@ -410,6 +420,8 @@ def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: P
     path = tmp_path / "own.html"
     path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
     page = opened(browser, path)
+    # beside those of the house: a linkage that Python finds for a path is one of them
+    assert set(OWN) < set(page.evaluate("window.studio.tables.mechanisms.map((one) => one.name)"))
     found = _shown(page)["columns"]
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
     _near(found["pendulum.angle"], wanted["pendulum.angle"])

@@ -40,7 +40,8 @@ def test_a_widget_shows_what_it_is_made_of(what: Any, state: dict[str, Any]) -> 
 
 def test_a_published_set_is_its_case_and_another_name_is_refused() -> None:
     widget = Widget("table-3.1")
-    assert widget.case.parameters == PUBLISHED["table-3.1"].parameters
+    known = PUBLISHED["table-3.1"]
+    assert (widget.case.parameters, widget.case.initial) == (known.parameters, known.initial)
     with pytest.raises(InputError, match="no published set 'table-9'"):
         Widget("table-9")
 
