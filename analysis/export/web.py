@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from linkwork.mechanism import Mechanism
@@ -27,8 +29,14 @@ _OWN = Path(__file__).with_name("browser")
 _DRIVEN = ("derivative", "outputs", "clearance", "forward")
 
 
-def build_web(mechanism: Mechanism) -> bytes:
+def build_web(mechanism: Mechanism, coupled: Mapping[int, float] = MappingProxyType({})) -> bytes:
     """Build the WebAssembly of a mechanism; see `browser/studio.c` for its functions.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    coupled : mapping of int to float
+        Turns, per turn of the crank, of the rotations that springs couple to it, by the index of the degree of freedom.
 
     Raises
     ------
@@ -37,7 +45,7 @@ def build_web(mechanism: Mechanism) -> bytes:
     """
     check(mechanism)
     with tempfile.TemporaryDirectory(prefix="linkwork-web-") as folder:
-        sources = web_sources(mechanism)
+        sources = web_sources(mechanism, coupled)
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         files = [name for name in sources if name.endswith(".c")]
@@ -45,14 +53,16 @@ def build_web(mechanism: Mechanism) -> bytes:
         return (Path(folder) / "module.wasm").read_bytes()
 
 
-def web_sources(mechanism: Mechanism) -> dict[str, str]:
-    """Return all C files of a mechanism's WebAssembly module by name."""
+def web_sources(mechanism: Mechanism, coupled: Mapping[int, float]) -> dict[str, str]:
+    """Return all C files of a mechanism's WebAssembly module by name; ``coupled`` is that of `build_web`."""
     files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHARED}
     files |= {path.name: path.read_text(encoding="utf-8") for path in sorted(_OWN.glob("*.[ch]"))}
     others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
     files["model.h"] += f"#ifndef DRIVEN_C\n{''.join(others)}#endif\n"
     return (
-        files | generated_files(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
+        files
+        | generated_files(mechanism, NATIVE)
+        | {"drawing.h": _header(mechanism, coupled), "drawing.c": _drawing(mechanism)}
     )
 
 
@@ -61,7 +71,7 @@ def crank_index(mechanism: Mechanism) -> int:
     return next(iter(mechanism.cyclic_freedoms), -1)
 
 
-def _header(mechanism: Mechanism) -> str:
+def _header(mechanism: Mechanism, coupled: Mapping[int, float]) -> str:
     """Return the text of drawing.h: the declarations that a browser's module has in addition to a native FMU's."""
     joints = mechanism.drawing.joints if mechanism.drawing else ()
     freedoms = mechanism.freedoms
@@ -72,6 +82,9 @@ def _header(mechanism: Mechanism) -> str:
         sum(1 << n for n, argument in enumerate(freedom.mode.arguments) if argument in forces) if freedom.mode else 0
         for freedom in freedoms
     ]
+    turn = freedoms[crank].period if crank >= 0 else 0.0
+    growth = [coupled.get(n, 0.0) * turn for n in range(len(freedoms))]
+    rounds = [0.0 if n in (crank, *coupled) else f.period for n, f in enumerate(freedoms)]
     return "\n".join(
         [
             f"/* The picture of a {mechanism.name}, and the drive modes that leave its freedoms free. Generated. */",
@@ -81,10 +94,14 @@ def _header(mechanism: Mechanism) -> str:
             f"enum {{ JOINTS = {len(joints)}, CRANK = {crank}, TORQUE = {_torque_input(mechanism, crank)} }};",
             f"enum {{ MOTOR = {len(MOTOR)} }};",
             "extern double motor[MOTOR], motor_change[MOTOR];",
-            f"#define PERIOD {freedoms[crank].period if crank >= 0 else 0.0!r}",
+            f"#define PERIOD {turn!r}",
             "/* for each freedom: index of its mode, -1 if it has none; a bit for each mode value that leaves it to a force */",
             f"static const int mode_of[FREEDOMS] = {{{', '.join(map(str, modes))}}};",
             f"static const int freeing[FREEDOMS] = {{{', '.join(map(str, freeing))}}};",
+            "/* growth in a turn of the crank of rotations coupled to it by springs; which nothing drives; a turn of others */",
+            f"static const double coupled[FREEDOMS] = {{{', '.join(map(repr, growth))}}};",
+            f"static const bool swings[FREEDOMS] = {{{', '.join(str(f.swings).lower() for f in freedoms)}}};",
+            f"static const double rounds[FREEDOMS] = {{{', '.join(map(repr, rounds))}}};",
             "Equation equations_joints;         /* x, m, u, p -> places */",
             "Equation equations_joints_forward; /* m, parameters, state as given, u, dparameters, dstate -> dplaces */",
             "Equation equations_motor;          /* motor, crank's speed -> torque */",

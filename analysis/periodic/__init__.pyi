@@ -48,6 +48,7 @@ from .motion.flow import liouville as liouville
 from .motion.flow import multipliers as multipliers
 from .motion.flow import require_sign as require_sign
 from .motion.flow import verdict as verdict
+from .motion.orbit import OF_A_RUN as OF_A_RUN
 from .motion.orbit import ORBIT_TOLERANCE as ORBIT_TOLERANCE
 from .motion.orbit import OrbitEquations as OrbitEquations
 from .motion.orbit import PeriodicOrbit as PeriodicOrbit

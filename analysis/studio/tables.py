@@ -14,7 +14,7 @@ from linkwork.variables import UNITS, Variable
 
 from ..export import Entry, build_web, crank_index, interface
 from ..mechanisms import name_in_files
-from ..periodic import damping_name, find_crank, free_position_name, motor_parameters, stiffness_name
+from ..periodic import OF_A_RUN, Drive, damping_name, find_crank, free_position_name, motor_parameters, stiffness_name
 
 #: Sections of parameters by role, and by unit; all others are dimensions.
 _SECTIONS = {
@@ -41,10 +41,15 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
         "title": mechanism.title,
         # a described linkage has its description as a set of its own name
         "described": mechanism.name in mechanism.published,
-        "module": base64.b64encode(gzip.compress(build_web(mechanism), 9, mtime=0)).decode(),
+        "module": base64.b64encode(
+            gzip.compress(build_web(mechanism, _coupled_turns(mechanism, crank)), 9, mtime=0)
+        ).decode(),
         "given": [_entry_rows(mechanism, entry.variable, entry.reference) for entry in given_entries(mechanism)]
         + _motor(mechanism, crank),
-        "outputs": [{"name": name, "text": v.description, **_unit(v)} for name, v in outputs.items()],
+        "outputs": [
+            {"name": name, "text": v.description, **({"run": True} if name in OF_A_RUN else {}), **_unit(v)}
+            for name, v in outputs.items()
+        ],
         "freedoms": [
             {
                 "coordinate": names.index(freedom.coordinate),
@@ -163,6 +168,15 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
         }
         for number, (name, (field, unit)) in enumerate(numbers.items())
     ]
+
+
+def _coupled_turns(mechanism: Mechanism, crank: int) -> dict[int, float]:
+    """Return the turns, per turn of the crank, of the free rotations that springs couple to it, by the index of the freedom."""
+    if crank < 0:
+        return {}
+    forces = {c.name: 0.0 for c in mechanism.channels if c.kind == "force" and c.freedom not in (-1, crank)}
+    drive = Drive(speed=1.0, crank=mechanism.freedoms[crank].coordinate, forces=forces)
+    return {n: float(ratio) for n, ratio in drive.ratios_by_freedom(mechanism).items()}
 
 
 def _stiffness_reference(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:

@@ -2,6 +2,8 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include <math.h>
+
 #include "sizes.h"
 
 /* In one file, all.c, everything but the functions of the standard is static, so that several FMUs link into one program. */

@@ -11,19 +11,12 @@
 /* Slope of z at t, of that length; whether the equations are defined there. */
 typedef bool Slope(const void *context, double t, const double z[], double result[], int length);
 
-/* Take a step of size h from z at t. `k` has room for the slopes of all stages, row by row, the first row filled in. Returns the
-   error relative to the scale, not a number where the equations are not defined. */
-static inline double attempt_step(Slope *slope, const void *context, double t, const double z[], double h, double k[],
-                                  const double scale[], int length, double result[]) {
+/* Error of a step of size h from z to `result`, relative to the scale, in the first `count` of so many components; `k` has the slopes of
+   all stages. Not a number where a component is infinite. */
+static inline double step_error(const double z[], const double result[], double h, const double k[], const double scale[],
+                                int length, int count) {
     double sum5 = 0.0, sum3 = 0.0;
-    for (int stage = 1; stage <= STAGES; stage++) {
-        for (int i = 0; i < length; i++) result[i] = 0.0;
-        for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
-            for (int i = 0; i < length; i++) result[i] += A_WEIGHT[w] * k[A_STAGE[w] * length + i];
-        for (int i = 0; i < length; i++) result[i] = z[i] + h * result[i];
-        if (stage < STAGES && !slope(context, t + C[stage] * h, result, k + stage * length, length)) return NAN;
-    }
-    for (int i = 0; i < length; i++) {
+    for (int i = 0; i < count; i++) {
         if (!isfinite(result[i])) return NAN; /* an infinite component has no error relative to itself */
         double weight = 1.0 / (scale[i] + fmax(fabs(z[i]), fabs(result[i]))), error5 = 0.0, error3 = 0.0;
         for (int e = 0; e < ERROR_STAGES; e++) {
@@ -36,7 +29,21 @@ static inline double attempt_step(Slope *slope, const void *context, double t, c
         sum3 += error3 * error3;
     }
     double denominator = sum5 + 0.01 * sum3;
-    return denominator == 0.0 ? 0.0 : fabs(h) * sum5 / sqrt(denominator * length);
+    return denominator == 0.0 ? 0.0 : fabs(h) * sum5 / sqrt(denominator * count);
+}
+
+/* Take a step of size h from z at t. `k` has room for the slopes of all stages, row by row, the first row filled in. Returns the
+   error relative to the scale, not a number where the equations are not defined. */
+static inline double attempt_step(Slope *slope, const void *context, double t, const double z[], double h, double k[],
+                                  const double scale[], int length, double result[]) {
+    for (int stage = 1; stage <= STAGES; stage++) {
+        for (int i = 0; i < length; i++) result[i] = 0.0;
+        for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
+            for (int i = 0; i < length; i++) result[i] += A_WEIGHT[w] * k[A_STAGE[w] * length + i];
+        for (int i = 0; i < length; i++) result[i] = z[i] + h * result[i];
+        if (stage < STAGES && !slope(context, t + C[stage] * h, result, k + stage * length, length)) return NAN;
+    }
+    return step_error(z, result, h, k, scale, length, length);
 }
 
 /* Return the factor by which the step grows or shrinks after one of that error, relative to the tolerance. */

@@ -25,6 +25,8 @@ export interface Arc {
   points: Point[];
   /** Whether the branch goes on beyond the low and the high end. */
   cut: [boolean, boolean];
+  /** Of what swings, whose amplitude is meant. */
+  of: number;
 }
 
 const HALF_POWER = Math.SQRT1_2;
@@ -41,7 +43,7 @@ const overlap = (a: Arc, b: Arc): Interval => [
   Math.min(span(a)[1], span(b)[1]),
 ];
 
-export function splitArcs(branch: Point[], tolerance: number): Arc[] {
+export function splitArcs(branch: Point[], tolerance: number, of = 0): Arc[] {
   // at a special point a multiplier is on the unit circle: its neighbours judge
   const holds = branch.map((point) => point.kind !== "" || largest(point) <= 1 + tolerance);
   const way = (i: number): string => {
@@ -58,20 +60,21 @@ export function splitArcs(branch: Point[], tolerance: number): Arc[] {
       cut.reverse();
     }
     if (points[0].value < points[points.length - 1].value)
-      found.push({ stable: way(first).startsWith("true"), points, cut });
+      found.push({ stable: way(first).startsWith("true"), points, cut, of });
     first = i;
   }
   return found;
 }
 
 /** The amplitude of an arc at a value, between its points. */
-export function interpolateAmplitude({ points }: Arc, value: number): number {
+export function interpolateAmplitude({ points, of }: Arc, value: number): number {
   const i = Math.max(
     1,
     points.findIndex((point) => point.value >= value),
   );
   const [a, b] = [points[i - 1], points[i]];
-  return a.amplitude + ((b.amplitude - a.amplitude) * (value - a.value)) / (b.value - a.value);
+  const [low, high] = [a.amplitudes[of], b.amplitudes[of]];
+  return low + ((high - low) * (value - a.value)) / (b.value - a.value);
 }
 
 /** Whether two arcs are one curve: a branch that was followed from both of its ends. */
@@ -96,8 +99,8 @@ function union(intervals: Interval[], least: number): Interval[] {
 }
 
 /** The half-power point of a peak to one side, by the cubic through the points about it; infinite at a higher peak. */
-function bandEnd({ points }: Arc, top: number, way: number): number {
-  const a = points.map((point) => point.amplitude);
+function bandEnd({ points, of }: Arc, top: number, way: number): number {
+  const a = points.map((point) => point.amplitudes[of]);
   const level = HALF_POWER * a[top];
   let i = top;
   while (i + way >= 0 && i + way < a.length) {
@@ -109,7 +112,8 @@ function bandEnd({ points }: Arc, top: number, way: number): number {
     for (const one of about) {
       let weight = 1;
       for (const other of about)
-        if (other !== one) weight *= (level - other.amplitude) / (one.amplitude - other.amplitude);
+        if (other !== one)
+          weight *= (level - other.amplitudes[of]) / (one.amplitudes[of] - other.amplitudes[of]);
       value += weight * one.value;
     }
     const [low, high] = [points[i].value, points[i - way].value].sort((p, q) => p - q);
@@ -120,7 +124,7 @@ function bandEnd({ points }: Arc, top: number, way: number): number {
 
 /** The half-power bands of the peaks of an arc, and of where it is largest at its end and loses its stability. */
 function resonances(arc: Arc): Interval[] {
-  const a = arc.points.map((point) => point.amplitude);
+  const a = arc.points.map((point) => point.amplitudes[arc.of]);
   const bands: Interval[] = [];
   const lowest = (top: number, way: number): number => {
     let least = a[top];
@@ -146,8 +150,8 @@ function resonances(arc: Arc): Interval[] {
   return bands.filter((band) => band.every(Number.isFinite));
 }
 
-/** Where a machine resonates, may jump, or has no stable motion of one turn, between two values. */
-export function rangesToAvoid(arcs: Arc[], low: number, high: number): Avoided[] {
+/** Where a machine resonates, may jump, or has no stable motion of one turn, between two values; `names` of what swings. */
+export function rangesToAvoid(arcs: Arc[], low: number, high: number, names = [""]): Avoided[] {
   const least = SLIVER * (high - low);
   const stable = arcs.filter((arc) => arc.stable);
   const several = stable.flatMap((a, i) =>
@@ -159,7 +163,10 @@ export function rangesToAvoid(arcs: Arc[], low: number, high: number): Avoided[]
   const edges = [low, ...union(stable.map(span), least).flat(), high];
   const without = edges.flatMap((edge, i): Interval[] => (i % 2 === 0 ? [[edge, edges[i + 1]]] : []));
   const found: [string, Interval[]][] = [
-    ["resonance, above 0.71 of the peak", union(stable.flatMap(resonances), least)],
+    ...names.map((name, of): [string, Interval[]] => [
+      `resonance${names.length > 1 ? ` of ${name}` : ""}, above 0.71 of the peak`,
+      union(stable.map((arc) => ({ ...arc, of })).flatMap(resonances), least),
+    ]),
     ["several stable motions, jumps between them", union(several, least)],
     ["no stable motion of one turn found", without],
   ];
@@ -186,7 +193,7 @@ export function findJumps(arcs: Arc[]): Jump[] {
       found.push({
         value: end.value,
         rising,
-        before: end.amplitude,
+        before: end.amplitudes[arc.of],
         after: after.map((one) => interpolateAmplitude(one, end.value)).sort((a, b) => a - b),
       });
     }

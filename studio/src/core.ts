@@ -20,7 +20,7 @@ interface Face {
   studio_motor(): number;
   studio_branch(reference: number, size: number, sense: number): number;
   studio_follow(): number;
-  studio_amplitude(): number;
+  studio_amplitudes(): void;
   studio_natural(reference: number): number;
   studio_drag(joint: number, first: number, second: number): number;
 }
@@ -86,7 +86,7 @@ export class Core {
     return new Float64Array(
       this.face.memory.buffer,
       this.face.studio_found(),
-      7 + 3 * this.most + this.most ** 2,
+      7 + 5 * this.most + this.most ** 2,
     );
   }
 
@@ -94,13 +94,14 @@ export class Core {
     const all = this.found();
     const size = found ? all[0] : 0;
     const real = 4 + this.most + this.most * this.most;
+    const place = real + 2 * this.most + 3;
     return {
       found,
       sentence: this.sentence(),
       size,
       period: all[3],
       start: Array.from(all.slice(4, 4 + size)),
-      place: all[real + 2 * this.most],
+      places: Array.from(all.slice(place, place + all[place - 1])),
       multipliers: Array.from({ length: size }, (_, i) => [all[real + i], all[real + this.most + i]]),
     };
   }
@@ -111,16 +112,19 @@ export class Core {
   }
 
   /** The next motion on the branch; nothing where there is none. */
-  follow(): Omit<Point, "amplitude"> | undefined {
+  follow(): Omit<Point, "amplitudes"> | undefined {
     if (this.face.studio_follow() !== 1) return undefined;
     const { start, multipliers } = this.motion(true);
-    const [value, kind] = this.found().slice(-2);
+    const [value, kind] = this.found().slice(4 + 3 * this.most + this.most ** 2);
     return { value, start, multipliers, kind: (["", "fold", "doubling"] as const)[kind] };
   }
 
-  /** Half of how far the motion that was found swings. */
-  amplitude(): number {
-    return this.face.studio_amplitude();
+  /** Half of how far each coordinate swings in the motion that was found. */
+  amplitudes(): number[] {
+    this.face.studio_amplitudes();
+    const all = this.found();
+    const swing = all.length - this.most;
+    return Array.from(all.slice(swing, swing + all[swing - this.most - 1]));
   }
 
   /** The natural frequency (rad/s) under what is given; see studio_natural. */

@@ -60,7 +60,7 @@ export function* follow(core: Core, { given, axes, start, at }: Exploration): Ge
       yield { part, sentence: orbit.sentence || core.sentence() };
       continue;
     }
-    const first: Point = { value, amplitude: core.amplitude(), kind: "", ...motion(orbit) };
+    const first: Point = { value, amplitudes: core.amplitudes(), kind: "", ...motion(orbit) };
     yield { part, point: first };
     let last = first;
     for (let count = 1; count < MOST_POINTS; count++) {
@@ -69,7 +69,7 @@ export function* follow(core: Core, { given, axes, start, at }: Exploration): Ge
         yield { part, sentence: core.sentence() };
         break;
       }
-      last = { ...next, amplitude: core.amplitude() };
+      last = { ...next, amplitudes: core.amplitudes() };
       yield { part, point: last };
       if (last.value <= low || last.value >= high) {
         ends.push(last);

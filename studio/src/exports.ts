@@ -6,7 +6,9 @@ import type { Drawn } from "./picture";
 import {
   type Given,
   type Mechanism,
+  outputPlace,
   rowLength,
+  type Source,
   type State,
   checkState,
   type Tables,
@@ -103,13 +105,14 @@ ${lines.join("\n")}
 }
 
 /** Time and all outputs of the motion that is shown, in SI. */
-export function tableText(m: Mechanism, rows: Rows): string {
+export function tableText(m: Mechanism, rows: Rows, source: Source = "run"): string {
   const length = rowLength(m);
-  const lines = [["time", ...m.outputs.map((output) => output.name)].join(",")];
+  const of = m.outputs.filter(({ run }) => !run || source === "run");
+  const places = of.map((output) => outputPlace(m, m.outputs.indexOf(output)));
+  const lines = [["time", ...of.map((output) => output.name)].join(",")];
   for (let row = 0; row < rows.count; row++) {
     const start = row * length;
-    const outputs = rows.values.subarray(start + 1 + m.states, start + 1 + m.states + m.outputs.length);
-    lines.push([rows.values[start], ...outputs].join(","));
+    lines.push([rows.values[start], ...places.map((place) => rows.values[start + place])].join(","));
   }
   return `${lines.join("\n")}\n`;
 }
@@ -146,6 +149,7 @@ export interface Saved {
   state: State;
   duration: number;
   rows?: Rows;
+  source?: Source;
   orbit?: Orbit;
   drawing: { svgText(): string; drawn(): Drawn[]; size: [number, number] };
 }
@@ -153,7 +157,7 @@ export interface Saved {
 /** Save in one of the forms of the list. */
 export async function saveAs(
   form: string,
-  { mechanism: m, state, duration, rows, orbit, drawing }: Saved,
+  { mechanism: m, state, duration, rows, source, orbit, drawing }: Saved,
 ): Promise<void> {
   const text = (name: string, type: string, content: string): void =>
     save(name, new Blob([content], { type }));
@@ -163,7 +167,7 @@ export async function saveAs(
     ssv: () => text("parameters.ssv", "application/xml", parameterText(m, state)),
     dxf: () => text("drawing.dxf", "image/vnd.dxf", dxfText(drawing.drawn())),
     svg: () => text("drawing.svg", "image/svg+xml", drawing.svgText()),
-    table: () => rows && text("motion.csv", "text/csv", tableText(m, rows)),
+    table: () => rows && text("motion.csv", "text/csv", tableText(m, rows, source)),
     png: async () => {
       const back = getComputedStyle(document.body).getPropertyValue("--card");
       save("drawing.png", await pixels(drawing.svgText(), ...drawing.size, back));

@@ -274,7 +274,8 @@ class Studio {
     const angle = m.crank < 0 ? 0 : row[outputPlace(m, m.freedoms[m.crank].coordinate)];
     const crank = m.crank < 0 ? "" : `, crank at ${((angle * 180) / Math.PI).toFixed(1)} deg`;
     by("instant").textContent = `t = ${row[0].toFixed(4)} s${crank}`;
-    this.numbers.write(row, roundingSizes(m, this.playback.answer!.rows));
+    const { rows, source } = this.playback.answer!;
+    this.numbers.write(row, roundingSizes(m, rows), source);
   }
 
   // Changes
@@ -451,8 +452,8 @@ class Studio {
   /** Save what is shown, in one of the forms of the list. */
   private async save(form: string): Promise<void> {
     const { mechanism, state, picture: drawing } = this;
-    const { rows, orbit } = this.playback.answer ?? {};
-    await saveAs(form, { mechanism, state, duration: this.duration(), rows, orbit, drawing });
+    const { rows, orbit, source } = this.playback.answer ?? {};
+    await saveAs(form, { mechanism, state, duration: this.duration(), rows, source, orbit, drawing });
     if (form !== "link") return;
     history.replaceState(null, "", pageAddress({ ...state, view: this.view.kept }));
     this.fault("");

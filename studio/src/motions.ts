@@ -7,8 +7,8 @@ export interface Orbit {
   size: number;
   period: number;
   start: number[];
-  /** In the state, of the first of what it starts with: whose amplitude is meant. */
-  place: number;
+  /** In the state, of what swings: whose amplitudes are meant; none where all is prescribed. */
+  places: number[];
   /** Real and imaginary parts, the largest modulus first. */
   multipliers: [number, number][];
 }
@@ -23,7 +23,8 @@ export interface Rows {
 /** A motion on a branch. */
 export interface Point {
   value: number;
-  amplitude: number;
+  /** Of all that swings. */
+  amplitudes: number[];
   start: number[];
   multipliers: [number, number][];
   kind: "" | "fold" | "doubling";

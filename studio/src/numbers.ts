@@ -1,6 +1,6 @@
 /** All outputs at the instant that is drawn, as a table. */
 
-import { type Mechanism, outputPlace } from "./tables";
+import { type Mechanism, outputPlace, type Source } from "./tables";
 import { shown } from "./words";
 
 export class Numbers {
@@ -28,11 +28,12 @@ export class Numbers {
     place.append(this.box);
   }
 
-  /** The numbers of a row; those that are rounding are none. */
-  write(row: Float64Array, roundings: Map<string, number>): void {
+  /** The numbers of a row of a motion; those that are rounding are none. */
+  write(row: Float64Array, roundings: Map<string, number>, source: Source): void {
     if (!this.box.open) return;
     const m = this.mechanism;
     m.outputs.forEach((output, n) => {
+      this.table.rows[n].hidden = output.run === true && source === "steady";
       const value = row[outputPlace(m, n)];
       const rounding = Math.abs(value) <= (roundings.get(output.unit) ?? 0);
       this.cells[n].textContent = shown(rounding ? 0 : value, output, 6);

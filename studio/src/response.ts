@@ -25,13 +25,21 @@ export class Response extends Search {
   /** Motions in the order of a branch, by the number of its part. */
   private parts: Point[][] = [];
   private sentences: string[] = [];
+  /** Whose amplitude is shown, where several coordinates swing. */
+  private readonly whose = document.createElement("select");
   avoided: Avoided[] = [];
 
   constructor(
     go: Go,
     private readonly tolerance: number,
   ) {
-    super("Response: how far the slider swings over the speed", ["What varies"], HEIGHT, go);
+    super("Response: how far the links swing over the speed", ["What varies"], HEIGHT, go);
+    this.whose.setAttribute("aria-label", "Whose amplitude is shown");
+    this.whose.addEventListener("change", () => {
+      if (this.done) this.tell();
+      this.draw();
+    });
+    this.box.querySelector(".axes")!.append(this.whose);
     this.plane.canvas.setAttribute("role", "slider");
   }
 
@@ -44,15 +52,25 @@ export class Response extends Search {
     this.sentences = [];
     this.avoided = [];
     this.words.textContent = "Being computed …";
+    const names = swinging(this.context!).map(called);
+    this.whose.hidden = names.length < 2;
+    if (names.join() === Array.from(this.whose.options, ({ value }) => value).join()) return;
+    this.whose.replaceChildren(...names.map((name) => new Option(name)));
   }
 
   protected take(found: Found[], done: boolean): void {
     for (const one of found)
       if ("point" in one) (this.parts[one.part] ??= []).push(one.point);
-      else if ("sentence" in one) this.sentences.push(one.sentence);
+      else if ("sentence" in one) this.sentences.push(this.ending(one.part, one.sentence));
     this.done = done;
     if (done) this.tell();
     this.draw();
+  }
+
+  /** Why a branch goes no further, and where. */
+  private ending(part: number, sentence: string): string {
+    const last = this.parts[part]?.at(-1);
+    return `A branch ends${last ? ` at ${shown(last.value, this.axes[0].given!)}` : ""}: ${sentence}.`;
   }
 
   /** The branches: through the motion that is shown both ways, from the low end, from the high end. */
@@ -61,17 +79,25 @@ export class Response extends Search {
     return [[...back.slice(1).reverse(), ...on], ...others].filter((branch) => branch.length > 1);
   }
 
+  /** What is shown of all that swings. */
+  private get of(): number {
+    return Math.max(0, this.whose.selectedIndex);
+  }
+
   private get arcs(): Arc[] {
-    return this.branches.flatMap((branch) => splitArcs(branch, this.tolerance));
+    return this.branches.flatMap((branch) => splitArcs(branch, this.tolerance, this.of));
   }
 
   protected paint(): void {
     const { plane } = this;
     const [{ given }] = this.axes;
     const [{ low, high }] = this.ranges;
-    const output = swinging(this.context!);
+    const output = swinging(this.context!)[this.of];
     const all = this.branches.flat();
-    const scale = (point: Point): Interval => [point.value * given!.factor, point.amplitude * output.factor];
+    const scale = (point: Point): Interval => [
+      point.value * given!.factor,
+      point.amplitudes[this.of] * output.factor,
+    ];
     const inside = all.filter((point) => point.value >= low && point.value <= high);
     const largest = Math.max(0, ...inside.map((point) => scale(point)[1]));
     // where there is nothing but rounding the axis goes to 1
@@ -116,11 +142,11 @@ export class Response extends Search {
   private tell(): void {
     const [{ given }] = this.axes;
     const [{ low, high }] = this.ranges;
-    const output = swinging(this.context!);
+    const output = swinging(this.context!)[this.of];
     const at = (value: number): string => shown(value, given!);
     const { arcs } = this;
     // where nothing was found there may be reasons that the sentences give
-    this.avoided = arcs.length > 0 ? rangesToAvoid(arcs, low, high) : [];
+    this.avoided = arcs.length > 0 ? rangesToAvoid(arcs, low, high, swinging(this.context!).map(called)) : [];
     const speed = given!.unit === "rpm" ? "Speeds" : `Values of ${called(given!)}`;
     const { natural } = this.context!;
     const lines: string[] = [];
@@ -145,7 +171,7 @@ export class Response extends Search {
       lines.push(`The period doubles at ${doublings.map((point) => at(point.value)).join(", ")}.`);
     if (Number.isFinite(natural) && given!.unit === "rpm")
       lines.push(`Natural frequency ${shown(natural, given!)} (mean effective mass).`);
-    for (const sentence of new Set(this.sentences)) lines.push(`A branch ends: ${sentence}.`);
+    for (const sentence of new Set(this.sentences)) lines.push(sentence);
     lines.push(
       "Solid: stable; dashed: unstable; square: fold; diamond: the period doubles; hatched: to avoid.",
     );
@@ -160,12 +186,12 @@ export class Response extends Search {
 
   protected point(event: MouseEvent): void {
     const [{ given }] = this.axes;
-    const output = swinging(this.context!);
+    const output = swinging(this.context!)[this.of];
     const [x, y] = this.plane.at(event);
     const away = (point: Point): number =>
       Math.hypot(
         this.plane.px(point.value * given!.factor) - this.plane.px(x),
-        this.plane.py(point.amplitude * output.factor) - this.plane.py(y),
+        this.plane.py(point.amplitudes[this.of] * output.factor) - this.plane.py(y),
       );
     let best: Point | undefined;
     for (const point of this.branches.flat()) if (!best || away(point) < away(best)) best = point;

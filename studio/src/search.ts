@@ -113,7 +113,7 @@ export abstract class Search {
     this.choices(context);
     const names = this.axes.map(({ given }) => given?.name);
     let none = "";
-    if (context.orbit.place < 0) none = "All motion is prescribed: nothing is free to swing.";
+    if (context.orbit.places.length === 0) none = "All motion is prescribed: nothing is free to swing.";
     else if (new Set(names).size < names.length)
       none = `Both axes are the ${called(this.axes[0].given!)}: choose another variable for one of them.`;
     // nothing is drawn then

@@ -28,6 +28,8 @@ export interface Given {
 export interface Output {
   name: string;
   text: string;
+  /** Whether it counts from the start of a run: a periodic motion has none. */
+  run?: boolean;
   unit: string;
   factor: number;
 }

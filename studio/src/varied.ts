@@ -35,9 +35,8 @@ export function driving(context: Context): Given | undefined {
   );
 }
 
-/** The output whose amplitude is meant, by its place in the state. */
-export function swinging({ mechanism: { freedoms, outputs }, orbit: { place } }: Context): Output {
-  return outputs[
-    place < freedoms.length ? freedoms[place].coordinate : freedoms[place - freedoms.length].rate
-  ];
+/** The outputs whose amplitudes are meant, by their places in the state. */
+export function swinging({ mechanism: { freedoms, outputs }, orbit: { places } }: Context): Output[] {
+  const n = freedoms.length;
+  return places.map((place) => outputs[place < n ? freedoms[place].coordinate : freedoms[place - n].rate]);
 }

@@ -7,7 +7,7 @@ import { ticks } from "../src/plane";
 
 const at = (value: number, amplitude: number, multiplier = 0.5, kind: Point["kind"] = ""): Point => ({
   value,
-  amplitude,
+  amplitudes: [amplitude],
   kind,
   start: [],
   multipliers: [[multiplier, 0]],

@@ -49,7 +49,7 @@ test("the lines of Python start from the motion that is shown, if there is one",
     size: 1,
     period: 1,
     start: [0.1, -2e-7],
-    place: 0,
+    places: [0],
     multipliers: [],
   };
   assert.match(pythonText(WHEEL, STATE, 2, orbit), /newton_orbit\(.*, start=\[0\.1,-2e-7\]\)/);
@@ -71,6 +71,9 @@ test("a table has a line of names and one for each row", () => {
     sentence: "",
   };
   assert.equal(tableText(WHEEL, rows), "time,wheel.angle,rim.position\n0,1,2\n0.5,3,4\n");
+  const [angle, position] = WHEEL.outputs;
+  const counted = { ...WHEEL, outputs: [angle, { ...position, run: true }] };
+  assert.equal(tableText(counted, rows, "steady"), "time,wheel.angle\n0,1\n0.5,3\n");
 });
 
 test("a link holds the whole state", () => {

@@ -11,7 +11,7 @@ const orbit = (first: [number, number]): Orbit => ({
   size: 1,
   period: 1,
   start: [],
-  place: 0,
+  places: [0],
   multipliers: [first],
 });
 /** Rows of time, state, angle, position, place and powers. */

@@ -1,7 +1,7 @@
 """What the studio computes beside the mechanism: response, stability, a motor, powers; its numbers against Python's."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.linkages import linkage
 from analysis.mechanisms import PUBLISHED, find_mechanism
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
-from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
+from analysis.run import Case, InductionMotor, Inputs, load_case, read_case, simulate
 from analysis.studio import make_page, page_case, page_state
 from benchmarks.studio import figures_in_words, measure_page
 from tests.analysis.conftest import opened
+from tests.analysis.test_linkages import coupled
+from tests.analysis.test_several_freedoms import SHAKER
 from tests.analysis.test_studio import _HELD, _load, _near, _saved, _varied, in_browser
 from tests.analysis.test_swinging_links import yoke
 
@@ -51,7 +54,7 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
     for point in points[:: len(points) // 12]:
         orbit = newton_orbit(RIG.parameters, Drive(speed=point["value"]), start=point["start"])
         _near(np.array(point["start"]) / [0.05, 5.0], orbit.start / [0.05, 5.0])
-        _near(point["amplitude"], orbit.amplitude)
+        _near(point["amplitudes"], orbit.amplitudes)
         found = np.sort_complex([complex(*pair) for pair in point["multipliers"]])
         # of a motion that grows a hundredfold a turn, errors grow as much
         np.testing.assert_allclose(found, np.sort_complex(orbit.multipliers), atol=1e-9 * max(1.0, orbit.largest**2))
@@ -98,8 +101,102 @@ def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_p
     crossing = response.branches[0].special[1].parameter
     assert max(point["value"] for point in swings) == pytest.approx(crossing, rel=1e-4)
     assert not any(point["kind"] for point in [*swings, *hangs])
-    assert not any(point["amplitude"] for point in hangs)
+    assert not any(point["amplitudes"][0] for point in hangs)
     assert not page.locator(".told").filter(has_text="Fold at").count()
+    page.close()
+
+
+def _supported(law: Any, **constants: Any) -> Any:
+    """A five-bar whose slider is held by a force law with kinks."""
+    built = linkage("supported", ground={"A": (0, 0), "O": (0.15, 0)}, gravity=9.81)
+    for name, points, length in (("crank", "AB", 0.05), ("coupler", "BC", 0.15), ("rocker", "DC", 0.15)):
+        bar = {"kind": "bar", "width": "20 mm", "thickness": "5 mm", "material": "steel"}
+        built.body(name, bar=(points[0], points[1]), length=length, section=bar)
+    built.body("slider", points={"D": (0, 0)}, mass=0.6).slide("G", body="slider", through="O")
+    built.spring("support", at="G", damping=8.0, law=law, constants=constants)
+    return built.freedom("crank", "A", speed="300 rpm").freedom("slider", "G")
+
+
+def _arm() -> Any:
+    """An arm that hangs on a crank pin, and turns back in it once a turn."""
+    built = linkage("hung", ground={"A": (0, 0)}, gravity=9.81)
+    built.body("crank", bar=("A", "B"), length=0.02, mass=1.0, inertia=1e-3)
+    built.body("arm", bar=("B", "C"), length=0.15, mass=1.0, inertia=2e-3).spring("hinge", at="B", damping=0.002)
+    return built.freedom("crank", "A", speed="60 rpm").freedom("arm", "B", driven=False)
+
+
+_PLAY = [("-6 mm", "-40 N"), ("-1 mm", "0 N"), ("1 mm", "0 N"), ("6 mm", "40 N")]
+
+
+@in_browser
+@pytest.mark.parametrize(
+    ("built", "speeds"),
+    [
+        (lambda: _supported("1500*x + k*max(x - 0.002, 0)", k=1e9), (300.0,)),
+        # the first motion is no guess for the second
+        (lambda: _supported(_PLAY), (150.0, 300.0)),
+        (lambda: coupled("coupled-in-the-page"), (60.0,)),
+        (_arm, (57.3,)),
+    ],
+    ids=["stop", "play", "coupling", "arm"],
+)
+def test_motions_over_kinks_and_of_links_that_turn_are_pythons(
+    browser: Any, tmp_path: Path, built: Callable[[], Any], speeds: tuple[float, ...]
+) -> None:
+    made = built().mechanism()
+    parameters = made.first_set.parameters
+    states = []
+    for speed in speeds:
+        inputs = Drive(speed=speed * RPM).inputs(made)
+        states.append(page_state(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
+    (tmp_path / "own.html").write_text(make_page(states[0]), encoding="utf-8")
+    page = opened(browser, tmp_path / "own.html")
+    found = [_load(page, state)["answer"]["orbit"] for state in states][-1]
+    assert found["found"], found["sentence"]
+    wanted = newton_orbit(parameters, Drive(speed=speeds[-1] * RPM), start=found["start"])
+    _near(found["start"], wanted.start)
+    assert max(abs(complex(*pair)) for pair in found["multipliers"]) == pytest.approx(wanted.largest, rel=1e-6)
+    page.close()
+
+
+@in_browser
+def test_another_crank_turns_as_often_as_the_speeds_at_the_start_say(browser: Any, tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "linkages" / "two-crank-five-bar.toml"
+    case = load_case(example, {"rightDrive.torque": 0.0, "initial.right_speed": "240 rpm"})
+    (tmp_path / "two.html").write_text(make_page(page_state(case)), encoding="utf-8")
+    page = opened(browser, tmp_path / "two.html")
+    found = _load(page, page_state(case))["answer"]["orbit"]
+    wanted = newton_orbit(
+        case.parameters, steady_drive(case.parameters, case.inputs, case.initial), start=found["start"]
+    )
+    assert wanted.drive.ratios == {"right.angle": 2}
+    _near(found["start"], wanted.start)
+    page.close()
+
+
+@in_browser
+def test_every_coordinate_has_its_ranges_to_avoid(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "shaker.toml").write_text(SHAKER, encoding="utf-8")
+    case = load_case(tmp_path / "shaker.toml", {"run.stop_time": 1.0})
+    (tmp_path / "shaker.html").write_text(make_page(page_state(case)), encoding="utf-8")
+    page = opened(browser, tmp_path / "shaker.html")
+    _explored(page, "response", {"What varies": (300.0, 900.0)})
+    found = page.evaluate("window.studio.charts.response.avoided")
+    wanted = frequency_response(case.parameters, 300.0 * RPM, 900.0 * RPM, doublings=0).speeds_to_avoid
+    assert [one["why"] for one in found] == [one.words for one in wanted]
+    np.testing.assert_allclose(
+        [[one["low"], one["high"]] for one in found], [[one.low, one.high] for one in wanted], rtol=1e-3
+    )
+    # a click on the peak of the second takes its motion
+    page.select_option('[aria-label="Whose amplitude is shown"]', "upright position")
+    point = page.evaluate(
+        "window.studio.charts.response.branches.flat().reduce((a, b) => a.amplitudes[1] > b.amplitudes[1] ? a : b)"
+    )
+    canvas = page.locator('canvas[role="slider"]')
+    box = canvas.bounding_box()
+    share = (point["value"] / RPM - 300.0) / 600.0
+    canvas.click(position={"x": 58 + (box["width"] - 70) * share, "y": 10 + (box["height"] - 50) * 0.08 / 1.08})
+    assert page.evaluate("window.studio.state.values['drive.speed']") == pytest.approx(point["value"], rel=1e-2)
     page.close()
 
 
@@ -190,7 +287,7 @@ def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
         varied = steady_drive(parameters, Inputs(torque=(0.2, motor), force=3.0))
         again = newton_orbit(parameters, varied, start=point["start"])
         np.testing.assert_allclose(point["start"], again.start, rtol=1e-8, atol=1e-9)
-        assert point["amplitude"] == pytest.approx(again.amplitude, rel=1e-8)
+        np.testing.assert_allclose(point["amplitudes"], again.amplitudes, rtol=1e-8)
     read = read_case(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
     assert read.inputs.parts("torque") == case.inputs.parts("torque")
     again_of = page_case(page_state(case))

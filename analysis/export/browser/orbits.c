@@ -18,8 +18,12 @@ enum {
     REFINEMENTS = 30                       /* of the place of a special point */
 };
 
-/* Local error of a step over an angle; where a motion settles; largest correction of what counts as found, and of a trial. */
-static const double FINE = 1e-12, COARSE = 1e-8, FOUND = 1e-10, REACH = 1.0;
+/* Local error of a step over an angle; where a motion settles; largest correction of what counts as found, of what counts where
+   corrections fall no further, as at kinks of a force law, and of a trial on a branch; least part of a correction. */
+static const double FINE = 1e-12, COARSE = 1e-8, FOUND = 1e-10, NOISE = 1e-7, REACH = 1.0, LEAST_SHARE = 1.0 / 4096.0;
+
+/* Greatest error of the columns in a step across a kink, relative to the tolerance. */
+static const double KINK = 1e6;
 
 /* Of a branch, relative to the range and the scale of y: the least and the greatest step, the greatest of what is varied, and the
    least cosine of the angle by which the branch may turn in one. */
@@ -29,19 +33,20 @@ static const double LEAST_ALONG = 1e-9, GREATEST_ALONG = 0.1, GREATEST_VARIED = 
 static struct {
     double size, residual, iterations, period;
     double y[MOST], monodromy[MOST * MOST], real[MOST], imaginary[MOST];
-    double place; /* in the state, of the first of y */
-    double value; /* of what is varied along a branch */
-    double kind;  /* of a point of a branch */
-} found;
+    double value;                           /* of what is varied along a branch */
+    double kind;                            /* of a point of a branch */
+    double count, place[MOST], swing[MOST]; /* of those of y that swing: how many, where in the state, and their amplitudes */
+} found = {.count = 1.0};
 
 double *FACE(studio_found)(void) {
     return (double *)&found;
 }
 
-/* A periodic motion over the crank's angle: which components of the state make up y, the others as they are held. */
+/* A periodic motion over the crank's angle: which components of the state make up y, the others as they are held; what y grows
+   by in a turn of the crank, where links make whole turns: a motion closes apart from that. */
 static struct {
     int size, place[MOST];
-    double x[STATES], u[ROOM(INPUTS)];
+    double x[STATES], u[ROOM(INPUTS)], growth[MOST];
 } section;
 
 /* What is varied along a branch: its value reference, of what is given of the motor -1 and below; how the state that y leaves
@@ -139,10 +144,13 @@ static bool across(double from, double to, double z[], const double scale[], int
         if (!slope(NULL, from + done, z, k, length)) return false;
         double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;
         *proposal = fmax(error <= 1.0 && h < *proposal ? *proposal : 0.0, h * step_factor(error));
-        if (error <= 1.0) {
+        bool least = *proposal < LEAST_STEP * whole;
+        /* at a kink of a force law, as at a stop, the rates of the columns jump: the least step is taken if y is accurate */
+        if (error <= 1.0 ||
+            (least && error < KINK && step_error(z, result, h, k, scale, length, section.size + 1) <= tolerance)) {
             memcpy(z, result, (size_t)length * sizeof *z);
             done = last ? whole : done + h;
-        } else if (*proposal < LEAST_STEP * whole) {
+        } else if (least) {
             return false;
         }
     }
@@ -180,11 +188,17 @@ static bool once_round(double y[], int columns, double tolerance, double *propos
         }
         if (reason != GOOD) return false;
     }
-    memcpy(y, z, (size_t)n * sizeof *z);
+    for (int i = 0; i < n; i++) y[i] = z[i] - section.growth[i];
     if (columns >= n) memcpy(found.monodromy, z + n + 1, (size_t)(n * n) * sizeof *z);
     if (columns > n) memcpy(varied.along, z + n + 1 + n * n, (size_t)n * sizeof *z);
     found.period = z[n];
     return true;
+}
+
+/* Whole turns in a change of a component of y, where that is a rotation that no spring couples to the crank. */
+static double whole_turns(int component, double change) {
+    int place = section.place[component];
+    return place < FREEDOMS && rounds[place] > 0.0 ? rounds[place] * round(change / rounds[place]) : 0.0;
 }
 
 /* What makes up y under the modes in force; the reason why there is no periodic motion over an angle. */
@@ -209,13 +223,26 @@ static Reason cut(void) {
         }
     }
     section.size = 0;
+    memset(section.growth, 0, sizeof section.growth);
     for (int rate = 0; rate < 2; rate++)
         for (int i = 0; i < FREEDOMS; i++)
             if (i != CRANK && !held[i]) section.place[section.size++] = rate * FREEDOMS + i;
     if (!held[CRANK]) section.place[section.size++] = FREEDOMS + CRANK;
+    for (int i = 0; i < section.size; i++) {
+        int at = section.place[i];
+        if (at >= FREEDOMS) break;
+        double turned = PERIOD * section.x[FREEDOMS + at] / section.x[FREEDOMS + CRANK];
+        /* another crank makes as many turns as the speeds at the start say */
+        section.growth[i] = coupled[at] + (swings[at] || !isfinite(turned) ? 0.0 : whole_turns(i, turned));
+    }
     for (int i = 2 * FREEDOMS; i < STATES; i++) section.x[i] = 0.0;
     section.x[CRANK] = 0.0;
-    found.place = section.size ? section.place[0] : -1.0;
+    found.count = 0.0;
+    for (int i = 0; i < section.size; i++) { /* coordinates; where none is free, the speed of the crank */
+        if (i > 0 && section.place[i] >= FREEDOMS) break;
+        found.place[i] = section.place[i];
+        found.count++;
+    }
     if (section.x[FREEDOMS + CRANK] == 0.0 && !held[CRANK] && motor[0] != 0.0) /* a run-up is not followed */
         section.x[FREEDOMS + CRANK] = motor[2] * (1.0 - 0.5 * motor[1]);
     if (section.x[FREEDOMS + CRANK] == 0.0) {
@@ -229,31 +256,59 @@ static Reason cut(void) {
     return GOOD;
 }
 
-/* Newton's method for y at the end equal to y at the start. */
-static bool newton(double y[]) {
+/* Newton's correction of y, whose turn has this end and monodromy matrix; its size relative to the scales, not finite where there
+   is none. */
+static double correction(const double y[], const double end[], const double monodromy[], const double scale[],
+                         double change[]) {
     int n = section.size;
-    double scale[LENGTH], proposal = PERIOD / 64.0;
-    bool close = false;
+    double matrix[MOST * MOST], size = 0.0;
+    for (int r = 0; r < n; r++) {
+        change[r] = end[r] - y[r];
+        for (int c = 0; c < n; c++) matrix[r * n + c] = (r == c) - monodromy[c * n + r];
+    }
+    if (!solve(matrix, change, n)) return INFINITY;
+    for (int i = 0; i < n; i++) size = isfinite(change[i]) ? fmax(size, fabs(change[i]) / scale[i]) : INFINITY;
+    return size;
+}
+
+/* Newton's method for y at the end equal to y at the start. A correction is taken in part where the next one by the same matrix
+   would not be smaller (Deuflhard's natural monotonicity test), and where the turn after it cannot be followed. */
+static bool newton(double y[]) {
+    int n = section.size, corrections = 0;
+    double scale[LENGTH], trial[MOST], change[MOST] = {0}, before[MOST * MOST];
+    double proposal = PERIOD / 64.0, share = 1.0, size = 0.0;
     motion_scales(scale);
-    for (int trial = 1; trial <= TRIALS; trial++) {
-        double end[MOST], matrix[MOST * MOST], residual = 0.0, size = 0.0;
-        memcpy(end, y, sizeof end);
-        if (!once_round(end, n, FINE, &proposal)) return false;
-        for (int i = 0; i < n; i++) {
-            end[i] -= y[i];
-            residual = fmax(residual, fabs(end[i]) / scale[i]);
+    memcpy(trial, y, sizeof trial);
+    while (corrections < TRIALS) {
+        double end[MOST], next[MOST];
+        memcpy(before, found.monodromy, sizeof before);
+        memcpy(end, trial, sizeof end);
+        bool good = once_round(end, n, FINE, &proposal);
+        if (corrections == 0 && !good) return false;
+        if (corrections > 0 &&
+            !(good && correction(trial, end, before, scale, next) <= fmax((1.0 - 0.25 * share) * size, FOUND))) {
+            share *= 0.5;
+            if (share < LEAST_SHARE) {
+                if (!good || size < NOISE) return good;
+                break;
+            }
+            memcpy(found.monodromy, before, sizeof before);
+        } else {
+            bool close = corrections > 0 && size < FOUND;
+            memcpy(y, trial, sizeof trial);
+            found.residual = 0.0;
+            for (int i = 0; i < n; i++) found.residual = fmax(found.residual, fabs(end[i] - y[i]) / scale[i]);
+            size = correction(y, end, found.monodromy, scale, change);
+            if (!isfinite(size)) break;
+            found.iterations = ++corrections;
+            share = fmin(1.0, 4.0 * share);
+            /* once more, so that the matrix is that of the motion found */
+            if (close || n == 0) {
+                for (int i = 0; i < n; i++) y[i] += change[i];
+                return true;
+            }
         }
-        for (int r = 0; r < n; r++)
-            for (int c = 0; c < n; c++) matrix[r * n + c] = (r == c) - found.monodromy[c * n + r];
-        if (!solve(matrix, end, n)) break;
-        for (int i = 0; i < n; i++) size = fmax(size, fabs(end[i]) / scale[i]);
-        if (!isfinite(size)) break;
-        found.residual = residual;
-        found.iterations = trial;
-        for (int i = 0; i < n; i++) y[i] += end[i] * (size > REACH ? REACH / size : 1.0);
-        /* once more, so that the matrix is that of the motion found */
-        if (close || n == 0) return true;
-        close = size < FOUND;
+        for (int i = 0; i < n; i++) trial[i] = y[i] + share * change[i];
     }
     Digits number;
     reason = TOLERANCE_NOT_MET;
@@ -262,11 +317,30 @@ static bool newton(double y[]) {
     return false;
 }
 
+/* A motion in which links make as many whole turns as in the turn of the crank after this start, or else none. */
+static bool newton_with_rounds(double y[]) {
+    double end[MOST], start[MOST], growth[MOST], proposal = PERIOD / 64.0;
+    bool may_turn = false;
+    memcpy(start, y, sizeof start);
+    memcpy(end, y, sizeof end);
+    memcpy(growth, section.growth, sizeof growth);
+    for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++) may_turn = may_turn || swings[section.place[i]];
+    if (may_turn && once_round(end, 0, COARSE, &proposal)) {
+        for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
+            if (swings[section.place[i]]) section.growth[i] += whole_turns(i, end[i] - y[i]);
+        if (memcmp(growth, section.growth, sizeof growth) != 0) {
+            if (newton(y)) return true;
+            memcpy(section.growth, growth, sizeof growth);
+            memcpy(y, start, sizeof start);
+        }
+    }
+    return newton(y);
+}
+
 /* The periodic motion under what is given, its monodromy matrix and multipliers, sought from y as it was found before (warm), from
    the state at the start, and from where that settles; whether there is one. */
 int FACE(studio_orbit)(int warm) {
     double y[MOST] = {0}, start[MOST] = {0}, before[MOST], proposal = PERIOD / 64.0;
-    char first[SENTENCE];
     int sized = (int)found.size;
     memcpy(before, found.y, sizeof before);
     found.size = 0.0;
@@ -275,9 +349,13 @@ int FACE(studio_orbit)(int warm) {
     if (reason != GOOD) return 0;
     int n = section.size;
     for (int i = 0; i < n; i++) y[i] = start[i] = section.x[section.place[i]];
-    if (warm && sized == n) memcpy(y, before, sizeof y);
-    bool good = newton(y);
-    memcpy(first, sentence, sizeof first);
+    warm = warm && sized == n;
+    if (warm) memcpy(y, before, sizeof y);
+    bool good = newton_with_rounds(y);
+    if (!good && warm) {
+        memcpy(y, start, sizeof y);
+        good = newton_with_rounds(y);
+    }
     if (!good) {
         double scale[LENGTH], change = INFINITY;
         motion_scales(scale);
@@ -287,12 +365,16 @@ int FACE(studio_orbit)(int warm) {
             memcpy(end, y, sizeof end);
             if (!once_round(end, 0, COARSE, &proposal)) break;
             change = 0.0;
-            for (int i = 0; i < n; i++) change = fmax(change, fabs(end[i] - y[i]) / scale[i]);
+            for (int i = 0; i < n; i++) {
+                end[i] -= whole_turns(i, end[i] - y[i]);
+                change = fmax(change, fabs(end[i] - y[i]) / scale[i]);
+            }
             memcpy(y, end, sizeof y);
         }
-        good = newton(y);
+        good = newton_with_rounds(y);
     }
     if (!good) return 0;
+    for (int i = 0; i < n; i++) y[i] -= whole_turns(i, y[i] - start[i]);
     reason = GOOD;
     sentence[0] = 0;
     memcpy(found.y, y, sizeof y);
@@ -332,12 +414,14 @@ static double *given_value(int reference) {
 /* What is varied to a value, and how all else changes with it. */
 static bool vary(double value) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)];
-    double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], du[ROOM(INPUTS)];
+    double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], du[ROOM(INPUTS)], growth[MOST];
     int reference = varied.reference;
+    memcpy(growth, section.growth, sizeof growth); /* links go on making as many turns */
     *given_value(reference) = found.value = value;
     reason = begin(&plant);
     if (reason == GOOD) reason = cut();
     if (reason != GOOD) return false;
+    memcpy(section.growth, growth, sizeof growth);
     for (int i = 0; i < PARAMETERS; i++) {
         own[i] = plant.given[parameter_at[i]];
         down[i] = parameter_at[i] == reference;
@@ -393,9 +477,10 @@ static int along(double step, double y[], double way[]) {
     int m = section.size + 1;
     double scale[LENGTH], matrix[(MOST + 1) * (MOST + 1)], change[MOST + 1], proposal = PERIOD / 64.0;
     double value = branch.value + step * branch.way[m - 1] * branch.size;
+    double size = INFINITY;
     bool close = false;
     for (int trial = 1; trial <= NEAR_TRIALS; trial++) {
-        double size = 0.0;
+        double before = size;
         if (!vary(value)) return 0;
         motion_scales(scale);
         for (int i = 0; trial == 1 && i < m - 1; i++) y[i] = branch.y[i] + step * branch.way[i] * scale[i];
@@ -405,12 +490,13 @@ static int along(double step, double y[], double way[]) {
         change[m - 1] = 0.0;
         bordered(scale, branch.way, matrix);
         if (!solve(matrix, change, m)) return 0;
+        size = 0.0;
         for (int i = 0; i < m; i++) size = fmax(size, fabs(change[i]));
         if (!(size < REACH)) return 0;
         for (int i = 0; i < m - 1; i++) y[i] += change[i] * scale[i];
         value += change[m - 1] * branch.size;
         if (close) return vary(value) && next_way(scale, branch.way, way) ? trial : 0;
-        close = size < FOUND;
+        close = size < (size > 0.5 * before ? NOISE : FOUND);
     }
     return 0;
 }
@@ -512,18 +598,23 @@ int FACE(studio_follow)(void) {
     return 0;
 }
 
-/* Half of how far the first of y swings in the motion that was found; 0 where that is no more than rounding. */
-double FACE(studio_amplitude)(void) {
-    double samples[SAMPLES], z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
+/* Half of how far each coordinate swings in the motion that was found, apart from its uniform growth; 0 where that is no more than
+   rounding. */
+void FACE(studio_amplitudes)(void) {
+    static double samples[MOST][SAMPLES];
+    double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
+    bool good = true;
     motion_scales(scale);
     memcpy(z, found.y, (size_t)section.size * sizeof *z);
-    for (int i = 0; i < SAMPLES; i++) {
-        double from = PERIOD * i / SAMPLES, to = PERIOD * (i + 1) / SAMPLES;
-        samples[i] = z[0];
-        if (!across(from, to, z, scale, section.size + 1, FINE, &proposal)) return NAN;
+    for (int n = 0; n < SAMPLES && good; n++) {
+        double from = PERIOD * n / SAMPLES, to = PERIOD * (n + 1) / SAMPLES;
+        for (int i = 0; i < found.count; i++) samples[i][n] = z[i] - section.growth[i] * n / SAMPLES;
+        good = across(from, to, z, scale, section.size + 1, FINE, &proposal);
     }
-    double size = swing_amplitude(samples);
-    return size > 10.0 * FOUND * scale[0] ? size : 0.0;
+    for (int i = 0; i < found.count; i++) {
+        double size = swing_amplitude(samples[i]);
+        found.swing[i] = !good ? NAN : size > 10.0 * FOUND * scale[i] ? size : 0.0;
+    }
 }
 
 /* Natural frequency of the freedom beside the crank, from the mean of what moves with it over a turn, the links at rest and it at

@@ -68,7 +68,7 @@ _MOST_SAMPLES, _SHARP = 8192, 1e-5
 #: Error of an amplitude, relative to the scale of the coordinate: a little more than that of the orbits.
 _ROUNDING = 10.0 * ORBIT_TOLERANCE
 #: Outputs that an orbit does not have: they count from the start of a run.
-_OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
+OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -352,7 +352,7 @@ class PeriodicOrbit(NotebookResult):
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
         modes = np.array(flow.modes, dtype=float)
         values = compute_outputs(mechanism, modes, np.append(self.point.constants, 0.0), states, channels)
-        keep = [n for n, name in enumerate(mechanism.output_names) if name not in _OF_A_RUN]
+        keep = [n for n, name in enumerate(mechanism.output_names) if name not in OF_A_RUN]
         time, period = _time(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
         return Turn(
             angle=angles,
