@@ -265,6 +265,7 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: InductionMotor(breakdown_torque=nan, breakdown_slip=0.2, synchronous_speed=50.0), "breakdown torque"),
         (lambda: InductionMotor(breakdown_torque=1.0, breakdown_slip=0.0, synchronous_speed=50.0), "breakdown slip"),
         (lambda: InductionMotor(breakdown_torque=1.0, breakdown_slip=0.2, synchronous_speed=0.0), "synchronous speed"),
+        (lambda: InductionMotor(breakdown_torque=-1.0, breakdown_slip=0.2, synchronous_speed=50.0), "the same sign"),
     ],
 )
 def test_what_is_not_usable_is_refused_with_a_sentence(make: Any, said: str) -> None:
