@@ -153,8 +153,8 @@ class InductionMotor:
             raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
         if self.breakdown_torque * self.synchronous_speed < 0.0:
             raise InputError(
-                f"breakdown torque is {self.breakdown_torque} N.m with a synchronous speed of {self.synchronous_speed} rad/s: they "
-                "must have the same sign, or the motor drives away from this speed"
+                f"breakdown torque is {self.breakdown_torque} N.m at a synchronous speed of {self.synchronous_speed} rad/s: "
+                "they must have the same sign, or the motor drives away from this speed"
             )
 
 
