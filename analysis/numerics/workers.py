@@ -78,7 +78,7 @@ def record_interrupts() -> Iterator[Interrupts]:
         _set_handler(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
-def check_jobs(n_jobs: int | None) -> None:
+def check_jobs(n_jobs: Any) -> None:
     """Check that a number of workers is a whole number, not 0.
 
     Raises
