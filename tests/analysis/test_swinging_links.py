@@ -37,7 +37,7 @@ from analysis.periodic import (
     unsought_hint,
     with_isolas,
 )
-from analysis.run import load_case, load_parameters
+from analysis.run import Inputs, load_case, load_parameters
 from analysis.tuning import Wish, load_tuning_case, tune
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, ParameterError
@@ -436,3 +436,12 @@ def test_a_sweep_leaves_what_hangs_still_where_that_is_unstable() -> None:
     assert last is not None
     assert last.crank_turns == 2
     assert last.amplitude == pytest.approx(0.5 * np.ptp(swings), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_an_undamped_crank_is_not_run_up_to_settle() -> None:
+    """Which took minutes, since nothing dies out."""
+    made = load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / "two-crank-five-bar.toml")
+    orbit = find_orbit(made.first_set.parameters, Inputs(left_speed="120 rpm", right_torque=0.0))
+    assert orbit.verdict().stability is Stability.MARGINAL
+    assert orbit.others == 5

@@ -638,10 +638,13 @@ def _reached_motion(
     The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's
     method found from the first guess, or None. If no motion is stable, or if a link may go round and no stable motion is near,
     ``first`` is returned. If no motion is stable and ``first`` is None, the result is the motion of the smallest amplitude.
+    Without damping the machine settles on no motion: ``first`` is returned if it is marginal, else the smallest such motion.
     """
     stable = found.stable
     if not stable:
         return first if first is not None else found.orbits[0]
+    if all(orbit.verdict().stability is Stability.MARGINAL for orbit in stable):
+        return next((orbit for orbit in stable if orbit is first), stable[0])
     if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):
         return stable[0]
     point = operating_point(stable[0].parameters, drive)
