@@ -8,6 +8,7 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,9 @@ def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     if what in PUBLISHED and not overrides:
         return page_state(published_case(what))
     if what in PUBLISHED:
-        return page_state(read_case({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
+        # a case file with a published set may begin at rest: give its own start
+        tables = {"published": what, "initial": asdict(PUBLISHED[what].initial)}
+        return page_state(read_case(tables, folder=Path.cwd(), title=what, overrides=overrides))
     if not Path(what).is_file():
         raise unknown_name(what, PUBLISHED, f"file or published set {what!r}")
     common.check_kind(what, common.RUN, common.PARAMETERS)

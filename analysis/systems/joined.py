@@ -140,25 +140,26 @@ class JoinedSystem:
         ``symbols`` stand for the connected outputs of mechanisms; ``values`` are the expressions of these outputs, which may
         contain ``symbols``.
         """
-        found, unknown = list(values), list(range(len(symbols)))
-        while unknown:
-            loop = casadi.vertcat(*(symbols[n] for n in unknown))
-            known = [n for n in unknown if not casadi.depends_on(found[n], loop)]
-            if not known:
-                break
-            unknown = [n for n in unknown if n not in known]
-            solved = (casadi.vertcat(*(which[n] for n in known)) for which in (symbols, found))
-            for n, value in zip(unknown, casadi.substitute([found[n] for n in unknown], *([each] for each in solved))):
-                found[n] = value
-        if unknown:
-            values = casadi.vertcat(*(found[n] for n in unknown)) - loop
-            matrix = casadi.jacobian(values, loop)
-            if casadi.depends_on(matrix, loop):
-                raise WiringError("an algebraic loop of the system is not linear: it cannot be joined to one model")
-            solution = -casadi.solve(matrix, casadi.substitute(values, loop, casadi.SX.zeros(len(unknown))))
-            for n, value in zip(unknown, casadi.vertsplit(solution)):
-                found[n] = value
-        return casadi.vertcat(casadi.SX(0, 1), *found)
+        found = list(values)
+        if not symbols:
+            return casadi.SX(0, 1)
+        _, order, bounds = casadi.jacobian_sparsity(casadi.vertcat(*values), casadi.vertcat(*symbols)).scc()
+        solved: list[int] = []
+        # the blocks of outputs that depend on one another; those on which a block depends come after it
+        for block in [order[a:b] for a, b in pairwise(bounds)][::-1]:
+            known, loop = (casadi.vertcat(*(symbols[n] for n in each)) for each in (solved, block))
+            value = casadi.vertcat(*(found[n] for n in block))
+            if solved:
+                value = casadi.substitute(value, known, casadi.vertcat(*(found[n] for n in solved)))
+            if casadi.depends_on(value, loop):
+                matrix = casadi.jacobian(value - loop, loop)
+                if casadi.depends_on(matrix, loop):
+                    raise WiringError("an algebraic loop of the system is not linear: it cannot be joined to one model")
+                value = -casadi.solve(matrix, casadi.substitute(value - loop, loop, casadi.SX.zeros(len(block))))
+            for n, one in zip(block, casadi.vertsplit(value)):
+                found[n] = one
+            solved += block
+        return casadi.vertcat(*found)
 
     def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
         """Integrate the system with SciPy's DOP853, and return all outputs at multiples of ``step`` (s).

@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 
 from ..numerics.cache import code_folder, store_file
 from .ssp import STEP
-from .wiring import BASE, End, Part, Port, Wiring, WiringError
+from .wiring import BASE, End, Part, Port, Wiring, WiringError, same_unit
 
 _TRANSFORMATIONS = tuple(
     f"{kind}Transformation" for kind in ("Linear", *(f"{k}Mapping" for k in ("Boolean", "Integer", "Enumeration")))
@@ -164,11 +164,11 @@ def read_ssp(path: str | Path) -> Wiring:
                 parts[name] = Part.from_fmu(name.replace(".", "_") if inside else name, place, {})
                 _check_connectors(component, parts[name], units)
                 given |= {f"{name}.{key}": v for key, v in _Source(archive, units, fmu).values(component).items()}
-        links = list(_links(systems))
         for inside, system in reversed(systems.items()):  # values at a higher level take precedence
+            within = list(_links(dict(_systems(system, inside))))
             for key, value in _Source(archive, units, None).values(system).items():
-                # that of a connector of the system is that of the inputs and parameters to which it is connected
-                ends = [e for e in _reach(links, End(inside, key), systems) if _causality(parts, e) != "output"]
+                # that of a connector of the system is that of the inputs and parameters in it to which it is connected
+                ends = [e for e in _reach(within, End(inside, key), systems) if _causality(parts, e) != "output"]
                 given |= dict.fromkeys([f"{e.part}.{e.port}" for e in ends] or [_join(inside, key)], value)
     for name in (names := [part.name for part in parts.values()]):
         if names.count(name) > 1:
@@ -184,7 +184,7 @@ def read_ssp(path: str | Path) -> Wiring:
     return Wiring(
         title=root.get("name", ""),
         parts={part.name: Part.from_fmu(part.name, part.fmu, values[name]) for name, part in parts.items()},
-        connections=_connections(path, links, systems, parts),
+        connections=_connections(path, list(_links(systems)), systems, parts),
         stop_time=stop_time,
         step=step,
         remarks=tuple(
@@ -261,7 +261,7 @@ def _check_connectors(component: Node, part: Part, units: Mapping[str, Base]) ->
         if port is None or unit in ("", port.unit):
             continue
         base = part.base_unit(port.name)
-        if base is not None and units.get(unit) != base:
+        if base is not None and not same_unit(units.get(unit, ()), base):
             raise WiringError(
                 f"the connector {part.name}.{port.name} is in {unit}: it must be in {port.unit or 'no unit'}, as the variable "
                 "of the FMU is"
@@ -291,9 +291,7 @@ def _connections(
 def _experiment(path: str | Path, root: Node) -> tuple[float, float]:
     """Return stop time and communication step (s)."""
     for experiment in _below(root, "DefaultExperiment"):
-        if "stopTime" not in experiment.attrib:
-            raise WiringError(f"{path} has a DefaultExperiment without stopTime: it must have one")
-        given = {"startTime": "0"} | experiment.attrib
+        given = {"startTime": "0", "stopTime": "1"} | experiment.attrib
         start, stop_time = (_as_number(given[name], None, f"{path}: {name}") for name in ("startTime", "stopTime"))
         if start:
             raise WiringError(f"{path} starts at {start} s: it must start at 0 s")

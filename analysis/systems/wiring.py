@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
+from math import isclose
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +30,11 @@ DIMENSIONLESS = tuple(float(k == "factor") for k in BASE)
 def exponents(unit: Any) -> tuple[float, ...]:
     """Return the exponents of the base units, factor and offset of a definition, as FMPy reads it."""
     return tuple(1.0 if k == "factor" and getattr(unit, k) is None else getattr(unit, k) or 0 for k in BASE)
+
+
+def same_unit(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Return whether two definitions of units agree, whose factors tools round differently; see `Part.base_unit`."""
+    return one == other or (len(one) == len(other) > 1 and all(map(partial(isclose, rel_tol=1e-9), one, other)))
 
 
 class Port(NamedTuple):
@@ -226,7 +233,7 @@ class Wiring:
                     )
             units = [self.port(end).unit for end in (source, target)]
             bases = [self.parts[end.part].base_unit(end.port) for end in (source, target)]
-            if units[0] != units[1] and None not in bases and bases[0] != bases[1]:
+            if units[0] != units[1] and bases[0] and bases[1] and not same_unit(bases[0], bases[1]):
                 said = [unit or "without a unit" for unit in units]
                 raise WiringError(
                     f"{source} -> {target}: the units do not match, {said[0]} and {said[1]}; they must be the same"

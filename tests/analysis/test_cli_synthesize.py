@@ -378,15 +378,18 @@ def test_the_end_of_a_turn_is_its_start(tmp_path) -> None:
     repeated = [*json.loads(SQUARE), [0, 0]]
     (tmp_path / "square.csv").write_text("\n".join(f"{x},{y}" for x, y in repeated))
     timed, rocker = '[task]\nkind = "timed-path"\n', '[task]\nkind = "rocker-function"\nangle_unit = "deg"\n'
+    moved = '[task]\nkind = "motion"\n'
     for text, expected in (
         (ELLIPSE + whole, syn.turn(24)),
         (f"{timed}{whole}points = {SQUARE}\n", syn.turn(4)),
         (f"{timed}{whole}points = {repeated}\n", np.linspace(0.0, 2.0 * pi, 5)),
         (f"{rocker}{whole}angle = [10, 30, 20]\n", syn.turn(3)),
         (f"{rocker}{whole}angle = [10, 130, 250, 370]\n", np.linspace(0.0, 2.0 * pi, 4)),
+        (f"{moved}{whole}points = {repeated}\nangle = [0, 1, 2, 3, 4]\n", syn.turn(5)),
+        (f"{moved}{whole}points = {repeated}\nangle = [0, 1, 2, 3, {2.0 * pi}]\n", np.linspace(0.0, 2.0 * pi, 5)),
     ):
         np.testing.assert_allclose(case(text, tmp_path).task.rotation, expected)
-    body = '[task]\nkind = "motion"\nangle = [0, 1, 2, 3, 4]\n'
+    body = f"{moved}angle = [0, 1, 2, 3, 4]\n"
     for text in (timed + whole, timed + part, timed + "rotation = [0, 1, 2, 3, 4]\n", body, body + part):
         assert case(text + 'file = "square.csv"\n', tmp_path).task.points.tolist() == repeated
     opened = '[task]\nkind = "untimed-path"\nfile = "square.csv"\nclosed = false\n'

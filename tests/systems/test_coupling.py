@@ -5,6 +5,7 @@ from math import inf, pi
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 import pytest
 import scipy
@@ -14,6 +15,7 @@ from analysis import InductionMotor, Inputs, figures, simulate, variant
 from analysis.linkages import linkage
 from analysis.systems import COUPLINGS, End, JoinedSystem, System, SystemRun, convergence, library, run_system
 from analysis.systems.description import PartTable
+from analysis.systems.wiring import WiringError
 from linkwork.errors import InputError, UnknownNameError
 
 from .conftest import system_of, wiring_of
@@ -297,6 +299,18 @@ def test_a_torsional_spring_of_two_bodies_swings_as_two_rotors_do() -> None:
     states = [scipy.linalg.expm(matrix * t) @ (np.array([0.0, 0.0, 3.0, 0.0]) - rest) + rest for t in run.time]
     np.testing.assert_allclose(run["left.angle"], [s[0] for s in states], atol=1e-8)
     np.testing.assert_allclose(run["shaft.exerted_torque"], [k * (s[1] - s[0] - rest[1]) for s in states], atol=1e-6)
+
+
+def test_a_loop_is_solved_apart_from_what_is_connected_to_it() -> None:
+    """Of five outputs the second and third are a loop; what comes before and after it need not be linear."""
+    x, *w = casadi.vertsplit(casadi.SX.sym("w", 6))
+    values = [w[3] ** 2 + w[1], w[4] ** 3 + 0.5 * w[2], w[1], w[2] ** 2, casadi.sin(x)]
+    solve = JoinedSystem._solve_connections
+    found = casadi.Function("found", [x], [solve(None, casadi, w, values)])(0.7)  # type: ignore[arg-type]
+    loop = 2.0 * np.sin(0.7) ** 3
+    np.testing.assert_allclose(found.full().ravel(), [loop**4 + loop, loop, loop, loop**2, np.sin(0.7)], rtol=1e-14)
+    with pytest.raises(WiringError, match="not linear"):
+        solve(None, casadi, w[:1], [w[0] ** 2])  # type: ignore[arg-type]
 
 
 def test_an_algebraic_loop_is_settled_at_the_start_and_joined_to_one_model() -> None:

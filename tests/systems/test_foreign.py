@@ -90,7 +90,7 @@ def rewrite(source: Path, target: Path, name: str, *changes: tuple[str, str]) ->
 
 def test_units_of_other_names_make_a_power_bond(folder: Path) -> None:
     defined = (
-        '<UnitDefinitions><Unit name="Nm"><BaseUnit kg="1" m="2" s="-2"/></Unit>'
+        '<UnitDefinitions><Unit name="Nm"><BaseUnit kg="1" m="2" s="-2" factor="1.0000000000001"/></Unit>'
         '<Unit name="rad/s"><BaseUnit rad="1" s="-1"/></Unit></UnitDefinitions>\n\t<LogCategories>'
     )
     units = ("<Real/>", '<Real unit="Nm"/>'), ('<Real start="0"/>', '<Real start="0" unit="rad/s"/>')
@@ -113,9 +113,10 @@ def test_start_values_with_units_fit_variables_without_one(folder: Path, tmp_pat
         assert read_ssp(other).parts[part].values == wiring.parts[part].values
 
 
-def test_an_experiment_without_an_end_is_refused(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("missing", "stop_time"), [(' stopTime="0.01"', 1.0), (' startTime="0.0"', 0.01)])
+def test_both_times_of_an_experiment_may_be_missing(
+    folder: Path, tmp_path: Path, missing: str, stop_time: float
+) -> None:
     made = write_ssp(system(folder).wiring(), tmp_path / "made.ssp")
-    other = rewrite(made, tmp_path / "other.ssp", "SystemStructure.ssd", (' stopTime="0.01"', ""))
-    with pytest.raises(WiringError, match="without stopTime"):
-        read_ssp(other)
-    assert read_ssp(rewrite(made, other, "SystemStructure.ssd", (' startTime="0.0"', ""))).stop_time == 0.01
+    other = rewrite(made, tmp_path / "other.ssp", "SystemStructure.ssd", (missing, ""))
+    assert read_ssp(other).stop_time == stop_time

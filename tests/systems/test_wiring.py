@@ -470,8 +470,16 @@ def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
     outer = text[end:]
     for port, edge, _ in ports:
         outer = outer.replace(f'="{port}"', f'="{edge}"')
-    text = text[:start] + inner + outer.replace('="linkage"', '="machine"')
-    top = f'<ssd:System name="system"><ssd:ParameterBindings>{whole}</ssd:ParameterBindings>'
+    # an input of the whole system, of which the value of the inner system is none: it stays within that system
+    shared = (
+        '<ssd:Connection startConnector="all" endElement="machine" endConnector="push"/>'
+        '<ssd:Connection startConnector="all" endElement="motor" endConnector="rotor.torque"/></ssd:Connections>'
+    )
+    text = text[:start] + inner + outer.replace('="linkage"', '="machine"').replace("</ssd:Connections>", shared)
+    top = (
+        '<ssd:System name="system"><ssd:Connectors><ssd:Connector name="all" kind="input"/></ssd:Connectors>'
+        f"<ssd:ParameterBindings>{whole}</ssd:ParameterBindings>"
+    )
     entries["SystemStructure.ssd"] = text.replace('<ssd:System name="system">', top).encode()
     with zipfile.ZipFile(tmp_path / "nested.ssp", "w") as archive:
         for name, content in entries.items():

@@ -345,7 +345,9 @@ class PrecisionPointsTable(_Curve):
             angles = Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle")
             angle = np.array(angles) + (self.turn or 0.0)
         points = self._timed_points(folder, self.rotation, angle)
-        rotation = _rotation(self.rotation, points)
+        # a path may pass a point twice, with the body at another angle
+        body = () if angle is None or len(angle) != len(points) else (np.cos(angle), np.sin(angle))
+        rotation = _rotation(self.rotation, points, *body)
         return {
             "points": points, "angle": angle, "rotation": rotation, "length": self.length, "objective": self.objective,
         }  # fmt: skip
