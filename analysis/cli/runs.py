@@ -271,7 +271,7 @@ def check(
                 failed.append(label)
             if not good or len(runs) <= len(methods):
                 _print_comparison(
-                    f"{case.title}: {path.name}, {words}, less in process ({in_process.source})", comparison
+                    f"{case.title}: {path.name}, {words}, minus in process ({in_process.source})", comparison
                 )
             if not good or path == runs[0][0]:
                 _write_comparison(common.output_folder(out) / label, case, in_process, through_fmu)

@@ -76,7 +76,7 @@ def new(name: str | None, file: str | None) -> None:
     if name not in known:
         raise unknown_name(name, known, f"system {name!r}")
     path = write_text(file or f"{name}.toml", known[name].read_text(encoding="utf-8"))
-    common.say(f"wrote {path}: linkwork system run {path}")
+    common.say(f"wrote {path}; next: linkwork system run {path}")
 
 
 @system.command()

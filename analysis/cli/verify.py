@@ -43,17 +43,17 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
             failed.append(outcome)
         beyond = [d for d in outcome.deviations if d.relative > outcome.allowed] or list(outcome.deviations[:1])
         cells = [
-            (d.name, f"{d.time:.6g}", f"{d.value:.7g}", f"{d.reference:.7g} {d.unit}", f"{d.relative:.1e}")
+            (d.name, f"{d.time:.4g}", f"{d.value:.7g}", f"{d.reference:.7g} {d.unit}", f"{d.relative:.1e}")
             for d in beyond
         ] or [("", "", "", "", "")]
         verdict = "pass" if outcome.passed else "FAIL"
         rows += [(outcome.experiment, *cell, f"{outcome.allowed:.0e}", verdict) for cell in cells[:5]]
     show_table(
         f"{fmu}, {interface}",
-        ("experiment", "variable", "t in s", "value", "reference", "relative", "allowed", "verdict"),
+        ("experiment", "variable", "at [s]", "value", "reference", "relative", "allowed", "verdict"),
         rows,
         words=("experiment", "variable", "verdict"),
-        unwrapped=("experiment", "variable", "reference", "verdict"),
+        unwrapped=("experiment", "variable", "value", "reference", "verdict"),
         styles=[None if row[-1] == "pass" else "red" for row in rows],
     )
     for outcome in failed:

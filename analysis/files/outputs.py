@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 
 from .paths import write_completely
@@ -31,13 +31,29 @@ class Writing:
         Name of the command; it may always overwrite its own files.
     force : bool
         Whether the command may also overwrite other files.
-    notes : list of str
-        A sentence for each file that was written under another name because a file had to be kept.
+    paths : dict of Path to Path
+        Where each file was written: at its path, or beside a file that had to be kept.
     """
 
     command: str
     force: bool = False
-    notes: list[str] = field(default_factory=list)
+    paths: dict[Path, Path] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> list[str]:
+        """A sentence on the files that had to be kept, if there are any."""
+        beside = {path: new for path, new in self.paths.items() if new != path}
+        names = ", ".join(path.name for path in beside.values())
+        wrote = f"since 'linkwork {self.command}' wrote"
+        match list(beside):
+            case []:
+                return []
+            case [one]:
+                kept = f"{one} was changed {wrote} it, or is not its file, and is kept: the new file is {names}"
+                return [f"{kept}; --force writes over it"]
+            case several:
+                kept = f"{len(several)} files were changed {wrote} them, or are not its files, and are kept: the new files are"
+                return [f"{kept} {names}; --force writes over them"]
 
 
 _CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
@@ -75,15 +91,13 @@ def write_text(path: str | Path, text: str) -> Path:
 def _free_path(path: str | Path) -> Path:
     """Return the path, or a numbered path in the same folder if the current command may not overwrite the file ``path``."""
     path, writing = Path(path), _CURRENT.get()
-    if writing is None or writing.force or _is_own(path, writing.command):
+    if writing is None or writing.force:
         return path
-    beside = next(p for n in count(2) if _is_own(p := path.with_stem(f"{path.stem}-{n}"), writing.command))
-    writing.notes.append(
-        f"{path} was changed since 'linkwork {writing.command}' wrote it, or is not its file, and is kept: the new file is "
-        f"{beside.name}; "
-        "--force writes over it"
-    )
-    return beside
+    # a file of this run may have the number of another one, such as linkage-2
+    taken = {new for other, new in writing.paths.items() if other != path}
+    names = chain([path], (path.with_stem(f"{path.stem}-{n}") for n in count(2)))
+    writing.paths[path] = next(name for name in names if name not in taken and _is_own(name, writing.command))
+    return writing.paths[path]
 
 
 def _record_output(path: Path) -> None:

@@ -86,8 +86,8 @@ def make_page(state: Mapping[str, Any]) -> str:
         If the mechanism has to be compiled, and cannot be.
     """
     page = PAGE.read_text(encoding="utf-8")
-    if f'"name":"{state["mechanism"]}"' not in page:
-        tables = json.loads(re.search(_SCRIPT.format("tables"), page, re.DOTALL)[2])  # type: ignore[index]
+    tables = json.loads(re.search(_SCRIPT.format("tables"), page, re.DOTALL)[2])  # type: ignore[index]
+    if all(mechanism["name"] != state["mechanism"] for mechanism in tables["mechanisms"]):
         tables["mechanisms"].append(mechanism_tables(MECHANISMS[state["mechanism"]]))
         page = _replace_script(page, "tables", tables)
     return _replace_script(page, "state", state)

@@ -358,6 +358,22 @@ def test_a_command_writes_over_its_own_files_and_no_others(tmp_path):
     assert write_text(tmp_path / "x-2.txt", "8").read_text() == "8"
 
 
+def test_a_file_of_a_command_is_not_lost_to_the_new_name_of_another(tmp_path):
+    (tmp_path / "x.txt").write_text("kept")
+    for _ in range(2):
+        with attribute_files("exact") as writing:
+            names = [write_text(tmp_path / name, name).name for name in ("x.txt", "x-2.txt", "x.txt", "x-3.txt")]
+        assert names == ["x-2.txt", "x-2-2.txt", "x-2.txt", "x-3.txt"]
+        (note,) = writing.notes
+        assert note.startswith(
+            "2 files were changed since 'linkwork exact' wrote them, or are not its files, and are kept"
+        )
+        assert "the new files are x-2.txt, x-2-2.txt; --force" in note
+    # whichever is written first
+    with attribute_files("check"):
+        assert [write_text(tmp_path / name, name).name for name in ("x-4.txt", "x.txt")] == ["x-4.txt", "x-5.txt"]
+
+
 def test_a_link_to_another_file_is_not_written_through(tmp_path):
     (tmp_path / "precious").write_text("kept")
     (tmp_path / "x.txt").symlink_to(tmp_path / "precious")

@@ -119,7 +119,8 @@ def _supported(law: Any, **constants: Any) -> Any:
 
 def _arm() -> Any:
     """An arm that hangs on a crank pin, and turns back in it once a turn."""
-    built = linkage("hung", ground={"A": (0, 0)}, gravity=9.81)
+    # a joint of the five-bar has the same name
+    built = linkage("guide", ground={"A": (0, 0)}, gravity=9.81)
     built.body("crank", bar=("A", "B"), length=0.02, mass=1.0, inertia=1e-3)
     built.body("arm", bar=("B", "C"), length=0.15, mass=1.0, inertia=2e-3).spring("hinge", at="B", damping=0.002)
     return built.freedom("crank", "A", speed="60 rpm").freedom("arm", "B", driven=False)

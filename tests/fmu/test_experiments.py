@@ -239,4 +239,7 @@ def test_the_command(natives: dict[str, Path]) -> None:
     result = linkwork("verify", natives["SliderCrank-native-fmi3"])
     assert result.exit_code == 0, result.output
     assert "7 of 7 experiments pass" in result.output
+    # no number is broken over two lines
+    lines = linkwork("verify", natives["FiveBarSlider-native"]).output.splitlines()
+    assert sum(line.startswith("│") for line in lines) == 12
     assert linkwork("verify", natives["SliderCrank-native-fmi3"], "--tolerance", "1e-15").exit_code == CHECK_FAILED

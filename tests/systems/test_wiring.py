@@ -496,7 +496,8 @@ def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
 def test_the_commands(linkwork: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert "motor-crank" in linkwork("system", "new").output
-    assert linkwork("system", "new", "motor-crank").exit_code == 0
+    wrote = linkwork("system", "new", "motor-crank")
+    assert wrote.output == "wrote motor-crank.toml; next: linkwork system run motor-crank.toml\n"
     for words in (
         ("build", "motor-crank.toml"),
         ("draw", "motor-crank.toml"),

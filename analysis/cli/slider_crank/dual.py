@@ -48,7 +48,7 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
     found = sc.compare(problem.turn(chosen))
     units, passed = chosen.units, [d.relative <= tolerance for d in found.differences]
     show_table(
-        f"{chosen.title}: dual numbers less vector mechanics, {found.angles} crank angles",
+        f"{chosen.title}: dual numbers minus vector mechanics, {found.angles} crank angles",
         ("quantity", "unit", "largest", "largest difference", "relative", "verdict"),
         [
             (

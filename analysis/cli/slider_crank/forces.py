@@ -79,7 +79,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     """Return the rows of a table: least and greatest value of each quantity, with the crank angles at which they occur.
 
     ``frames`` are the numbers of the frames in which joint forces are given. Forces and torques near singular angles are left
-    out.
+    out. A constant has no crank angles.
     """
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),
@@ -106,10 +106,12 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     rows = []
     for name, si, values, ends in found:
         cells = [name, units.name(si)]
+        # a value or a change that is only a rounding error compared with the greatest value in the same unit counts as zero
+        rounding = 1e-12 * size[si]
+        varies = values[ends[1]] - values[ends[0]] > rounding
         for i in ends:
-            # a value that is only a rounding error compared with the greatest value in the same unit is printed as zero
-            value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.factor(si)
-            cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}"]
+            value = 0.0 if abs(values[i]) <= rounding else values[i] * units.factor(si)
+            cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}" if varies else ""]
         rows.append(cells)
     return rows
 

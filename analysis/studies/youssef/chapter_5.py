@@ -349,7 +349,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
             text("5.3.1, L3882-3884"),
             why="the range of I4 in Fig 5.1 is not stated. In the true periodic motion the greatest width, up to sigma2 = "
             "0.1 (L3927), is "
-            + " and ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
+            + ", and ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
         ),
     )
 
