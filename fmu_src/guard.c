@@ -204,7 +204,7 @@ typedef struct {
     fmi2CallbackFunctions master, own;
     bool logging, said; /* said: the slave has logged what is wrong, in the present call */
     bool refused;       /* the last step */
-    double time;        /* of the last good step; not a number: not known */
+    double time;        /* of the last good step, at first the start; not a number: not known */
     char *name, resources[LONGEST_PATH];
 } Guard;
 
@@ -387,10 +387,14 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n
         return c && (good) ? mild(next.name(begin(c), ##__VA_ARGS__)) : refuse(c, "fmi2" #name ": a null pointer");            \
     }
 
-CALL(SetupExperiment,
-     (fmi2Component component, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start, fmi2Boolean has_stop,
-      fmi2Real stop),
-     true, has_tolerance, tolerance, start, has_stop, stop)
+fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
+                               fmi2Boolean has_stop, fmi2Real stop) {
+    Guard *c = component;
+    if (!c) return refuse(c, "fmi2SetupExperiment: a null pointer");
+    c->time = start;
+    return mild(next.SetupExperiment(begin(c), has_tolerance, tolerance, start, has_stop, stop));
+}
+
 CALL(EnterInitializationMode, (fmi2Component component), true)
 CALL(ExitInitializationMode, (fmi2Component component), true)
 CALL(Terminate, (fmi2Component component), true)

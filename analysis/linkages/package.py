@@ -25,7 +25,7 @@ from .equations import PoseWriter, counted_twists
 from .laws import WRITTEN
 from .mistakes import check_entries
 from .outputs import Outputs
-from .parameters import Drive, interface, length_and_mass
+from .parameters import Drive, interface, length_and_mass, rotations
 from .structure import Structure, analyse
 from .variables import Variables
 from .writing import function, indent_lines, quote
@@ -421,9 +421,26 @@ class Package:
             parts=indent_lines(parts, 12),
             paths="".join(f"{quote(name)}, " for name in self.picture.paths()),
             links=indent_lines(v.links(), 8),
-            rotation="radians(10.0)" if any(spring.law for spring in d.springs.values()) else "inf",
+            rotation=self._greatest_rotation(),
             switch="rough" if d.friction else "",
         )
+
+    def _greatest_rotation(self) -> str:
+        """Write the `Mechanism.greatest_rotation`: 10 deg of what turns fastest at the ends of a spring with a force law."""
+        laws = [spring for spring in self.description.springs.values() if spring.law]
+        if not laws:
+            return "inf"
+        fastest = 1.0
+        for n in range(len(self.interface.drives)):
+            turned = rotations(self.description, self.structure, n)
+            for spring in laws:
+                ends = [self.motion.owner(point) for point in spring.between] or (
+                    self.interface.twisted_bodies(spring) or self.structure.joints[spring.at].bodies
+                )
+                first, second = (turned.get(body, 0.0) for body in ends)
+                ratio = abs(second - first)
+                fastest = max(fastest, ratio if isfinite(ratio) else 1.0)
+        return f"radians({10.0 / fastest!r})"
 
 
 def _imports(body: str) -> str:

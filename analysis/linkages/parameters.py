@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from math import lcm
+from math import inf, isfinite, lcm
 from typing import NamedTuple
 
 from linkwork.errors import ParameterError
@@ -187,7 +187,23 @@ def needs_turns(spring: Spring) -> bool:
 
 def _returning_turns(description: Description, structure: Structure, freedom: int) -> int:
     """Count the turns of a freedom after which all gears are back at their angles; 0 if never, or if a rack is displaced."""
-    angles, turns = {GROUND: 0.0}, 1
+    turns = 1
+    for turned in rotations(description, structure, freedom).values():
+        if not isfinite(turned):
+            return 0
+        share = Fraction(turned).limit_denominator(100)
+        if abs(turned - share) > 1e-9:
+            return 0
+        turns = lcm(turns, share.denominator)
+    return turns
+
+
+def rotations(description: Description, structure: Structure, freedom: int) -> dict[str, float]:
+    """Return the rotations of bodies and gears by that of a freedom; infinite for a rack that is displaced.
+
+    Bodies of dyads, whose rotations are not proportional to that of a freedom, are left out.
+    """
+    angles = {GROUND: 0.0}
     for step in structure.steps:
         carrier = angles.get(step.parent, 0.0) if not isinstance(step, Dyad) else 0.0
         if isinstance(step, FreedomStep):
@@ -198,15 +214,8 @@ def _returning_turns(description: Description, structure: Structure, freedom: in
             factor = 1.0 / ratio if step.inverse else ratio
             angles[step.body] = carrier + factor * (angles[step.mate] - carrier)
         elif isinstance(step, RackStep):
-            if not step.turns and angles[step.mate] != carrier:
-                return 0
-            angles[step.body] = carrier
-    for turned in angles.values():
-        share = Fraction(turned).limit_denominator(100)
-        if abs(turned - share) > 1e-9:
-            return 0
-        turns = lcm(turns, share.denominator)
-    return turns
+            angles[step.body] = carrier if step.turns or angles[step.mate] == carrier else inf
+    return angles
 
 
 def interface(description: Description, structure: Structure) -> Interface:

@@ -372,7 +372,8 @@ class Mechanism:
     @cached_property
     def reach(self) -> tuple[float, ...]:
         """Return the largest change of each component of the state in a step of the integrator: see ``greatest_rotation``."""
-        angles = (self.greatest_rotation if freedom.period > 0.0 else inf for freedom in self.freedoms)
+        units = {variable.name: variable.unit for variable in self.variables}
+        angles = (self.greatest_rotation if units[freedom.coordinate] == "rad" else inf for freedom in self.freedoms)
         return (*angles, *[inf] * (len(self.freedoms) + 2))
 
     @property

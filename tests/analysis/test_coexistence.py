@@ -291,6 +291,8 @@ def test_a_part_with_stable_motions_that_no_line_meets_gets_a_line() -> None:
         largest=masked,
         amplitude=masked,
         starts=np.zeros((8, 8, 2, 2)),
+        index=np.ones((8, 8), dtype=int),
+        index_of_all=1,
         swing=("slider.position", "m"),
         computed=0,
     )

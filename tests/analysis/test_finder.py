@@ -24,7 +24,7 @@ from analysis.periodic import (
 )
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.published import SETS
 
@@ -218,7 +218,7 @@ def test_no_motion_where_the_crank_is_longer_than_the_other_links() -> None:
 def test_a_motion_of_two_turns_is_counted_once_and_one_of_a_single_turn_not_at_all() -> None:
     parameters = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.5)
     speed = 1170.0 * RAD_S_PER_RPM
-    simple, doubled = find_orbits(parameters, speed=speed), find_orbits(parameters, speed=speed, turns=2)
+    simple, doubled = find_orbits(parameters, speed=speed), find_orbits(parameters, speed=speed, turns=np.array([2]))
     assert [orbit.verdict().stability for orbit in simple.orbits] == [Stability.UNSTABLE]
     (orbit,) = doubled.orbits
     assert orbit.verdict().stability is Stability.STABLE
@@ -233,5 +233,6 @@ def test_under_a_motor_the_crank_speed_is_found_too() -> None:
 
 
 def test_turns_must_be_a_whole_number() -> None:
-    with pytest.raises(InputError, match="whole number"):
-        find_orbits(TABLE_3_1, speed=14.0 * pi, turns=0)
+    for turns in (0, 1.5, "two", [1, 0], []):
+        with pytest.raises(ParameterError, match="turns is"):
+            find_orbits(TABLE_3_1, speed=14.0 * pi, turns=turns)

@@ -1261,6 +1261,22 @@ def punch() -> Any:
     return built.freedom("wheel", "A", driven=True).mechanism()
 
 
+def geared_punch() -> Any:
+    """The same force, a tenth as great, on a shaft that turns ten times as fast."""
+    built = linkage("geared-punch", ground={"A": (0, 0), "B": (1, 0)})
+    built.body("wheel", points={"A": (0, 0)}, mass=30, inertia=4)
+    built.body("shaft", points={"B": (0, 0)}, mass=1, inertia=1e-6).gear("Z", bodies=("wheel", "shaft"), ratio=10)
+    built.spring("load", at="B", law=f"2e3*max(cos(x - 0.5) - {math.cos(PUNCH)!r}, 0)")
+    return built.freedom("wheel", "A", driven=True).mechanism()
+
+
+def punch_with_spring() -> Any:
+    """The same force beside a spring that winds up: the freedom has no period."""
+    built = linkage("punch-spring", ground={"A": (0, 0)}).body("wheel", points={"A": (0, 0)}, mass=30, inertia=4)
+    built.spring("load", at="A", law=f"2e4*max(cos(x - 0.5) - {math.cos(PUNCH)!r}, 0) + 1e-6*x")
+    return built.freedom("wheel", "A", driven=True).mechanism()
+
+
 def run_plant(mechanism: Any, _: Path) -> tuple[float, float]:
     plant = Plant(mechanism, mechanism.first_set.parameters, mechanism.initial(**ROLLING), drive_mode=0)
     plant.step(0.0, 0.7)
@@ -1292,6 +1308,12 @@ def test_no_step_passes_over_a_force_that_acts_over_a_few_degrees(run: Callable[
     angle, speed = run(punch(), tmp_path)
     assert angle // (2.0 * math.pi) == 2
     assert 20.0 - speed == pytest.approx(20.0 - math.sqrt(20.0**2 - 2.0 * 2.0 * WORK / 4.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(("make", "passes"), [(geared_punch, 2.2), (punch_with_spring, 2.0)])
+def test_a_step_is_bounded_by_what_turns_fastest_and_without_a_period(make: Callable[[], Any], passes: float) -> None:
+    _, speed = run_plant(make(), Path())
+    assert 20.0 - speed == pytest.approx(20.0 - math.sqrt(20.0**2 - 2.0 * passes * WORK / 4.0), rel=1e-2)
 
 
 @pytest.mark.parametrize("find", [newton_orbit, lambda p, drive, **o: search_orbits(p, drive, **o).orbits[0]])

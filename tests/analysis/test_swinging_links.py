@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from importlib import import_module
 from math import pi
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,12 +38,14 @@ from analysis.periodic import (
     unsought_hint,
     with_isolas,
 )
+from analysis.periodic.motion.discretisation import operating_point
 from analysis.run import Inputs, load_case, load_parameters
 from analysis.tuning import Wish, load_tuning_case, tune
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import PublishedSet
 
+coexistences = import_module("analysis.periodic.chart.coexistence")
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STROKE, ARM, MASS, INERTIA, GRAVITY, DAMPING = 0.02, 0.15, 0.5, 4e-3, 9.81, 0.01
 
@@ -102,6 +105,13 @@ def test_a_run_confirms_no_normal_form_where_the_motion_is_stable_again_nearby()
     point = response.branches[0].special[0]
     with pytest.raises(LinkworkError, match="too narrow"):
         confirm_form(response.family, point, normal_form(response.family, point))
+
+
+def test_from_a_start_that_goes_round_no_rotation_is_added_to_coexisting_motions() -> None:
+    point = operating_point(yoke("yoke-added").parameters, Drive(speed=20.0))
+    into = np.full((coexistences.MOST_ORBITS, 5), np.nan)
+    assert coexistences._add_motions(point, np.array([[-0.91119805, 21.98298217]]), into, 1)
+    np.testing.assert_allclose(into[0, 3:], 0.0, atol=1e-9)  # it hangs
 
 
 def test_an_amplitude_of_zero_has_no_elasticities() -> None:

@@ -48,6 +48,7 @@ from analysis.periodic import (
     stability_chart,
     steady_drive,
     sweep,
+    with_values,
 )
 from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
@@ -212,6 +213,13 @@ def test_rotors_on_motors_have_the_ratio_of_their_first_speeds_and_are_held_for_
         assert turned == pytest.approx(2.0 * pi * ratio * Fraction(ratio).denominator * 35 / 36)
     with pytest.raises(InputError, match="constant"):  # a torque that varies in time is no motor
         natural_modes(P, Inputs(left_speed=20.0, right_torque=ramp(0.0, 0.1, "0 s", "1 s")), initial=initial)
+
+
+def test_a_motor_is_reversed_by_two_of_its_numbers() -> None:
+    motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.0)
+    drive = Drive(speed=24.0, crank="left.speed", ratios={"right.angle": -1}, motors={"right.torque": motor})
+    back = {"right.torque.breakdown_torque": -0.05, "right.torque.synchronous_speed": -24.0}
+    assert with_values(P, drive, back)[1].motors["right.torque"].synchronous_speed == -24.0
 
 
 def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:

@@ -140,8 +140,10 @@ static bool across(double from, double to, double z[], const double scale[], int
     double result[LENGTH], done = 0.0, whole = to - from;
     for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
         double h = fmin(fmin(*proposal, reach[CRANK < 0 ? 0 : CRANK]), whole - done);
-        bool last = h >= whole - done;
         if (!slope(NULL, from + done, z, k, length)) return false;
+        for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
+            if (h * fabs(k[i]) > reach[section.place[i]]) h = reach[section.place[i]] / fabs(k[i]);
+        bool last = h >= whole - done;
         double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;
         *proposal = fmax(error <= 1.0 && h < *proposal ? *proposal : 0.0, h * step_factor(error));
         bool least = *proposal < LEAST_STEP * whole;

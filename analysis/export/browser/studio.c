@@ -48,8 +48,11 @@ void FACE(studio_reset)(void) {
 Reason begin(Plant *a) {
     sentence[0] = 0;
     a->start_time = 0.0;
-    if (motor[0] != 0.0 && !(isfinite(motor[0]) && motor[1] > 0.0 && isfinite(motor[2]) && motor[2] != 0.0)) {
-        strcpy(sentence, "of the motor the breakdown slip must be above 0, and the synchronous speed must not be 0");
+    if (motor[0] != 0.0 &&
+        !(isfinite(motor[0]) && motor[1] > 0.0 && isfinite(motor[2]) && motor[2] != 0.0 && motor[0] * motor[2] > 0.0)) {
+        strcpy(sentence,
+               "of the motor the breakdown slip must be above 0, and the synchronous speed must not be 0 and must have "
+               "the sign of the breakdown torque");
         return BAD_PARAMETER;
     }
     return plant_begin(a, sentence);

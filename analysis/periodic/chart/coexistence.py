@@ -22,7 +22,7 @@ from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import SAME, Drive, assembly_ranges
 from ..motion.flow import GAP, IN_LANES, PLAIN, TOLERANCE, VARIATIONAL, Flow, multipliers
-from ..motion.orbit import PeriodicOrbit, newton_orbit, require_turns
+from ..motion.orbit import PeriodicOrbit, require_turns, solve_orbit
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
@@ -250,17 +250,17 @@ def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, wh
     Return whether a motion was added. ``into`` is the point's part of the result of `_compute_motions`.
     """
     count = before = int(np.isfinite(into[:, 0]).sum())
-    away = np.abs(point.flow.remove_turns(into[:count, None, 3:] - starts) / point.scale(into[0, 3:])).max(axis=2)
+    away = np.abs(point.flow.remove_turns(into[:count, None, 3:] - starts) / point.scale(starts[0])).max(axis=2)
     for start in np.delete(starts, away.argmin(axis=1), axis=0):
         if count == MOST_ORBITS or int(np.nansum(into[:, 2])) == whole:
             break
         try:
-            orbit = newton_orbit(point.parameters, point.drive, start=start, settle=False)
+            orbit = solve_orbit(point, 1, start)
         except OrbitError:
             continue
         if all(orbit.distance(known) > SAME for known in into[:count, 3:]):
             index = np.sign(np.linalg.det(np.eye(len(start)) - orbit.monodromy))
-            into[count] = orbit.largest, orbit.amplitude, index, *orbit.start
+            into[count] = orbit.largest, orbit.amplitude, index, *point.flow.nearest_to_rest(orbit.start)
             count += 1
     into[:count] = into[np.argsort(into[:count, 1], kind="stable")]
     return count > before

@@ -474,7 +474,7 @@ def search_orbits(
     Motions in which an undriven link goes round are sought, too: one link at a time, at most once per turn of the crank. If the
     drive has a ratio for the link, only motions with this ratio are sought.
     """
-    if isinstance(turns, (list, tuple, range)):
+    if isinstance(turns, (list, tuple, range, set, np.ndarray)):
         numbers = sorted({Whole(least=1)(number, "turns") for number in turns})
         if not numbers:
             raise ParameterError("turns", turns, "have at least one number")

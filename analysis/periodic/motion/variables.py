@@ -188,7 +188,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
     own = drive.reference(mechanism).freedom
     of_drive: dict[str, Any] = {}
     acting: dict[str, float] = {}
-    motors: dict[str, InductionMotor] = {}
+    motors: dict[str, tuple[InductionMotor, dict[str, float]]] = {}
     of_mechanism: dict[str, float] = {}
     for name, value in values.items():
         what, freedom = of_cranks.get(name, ("", -1))
@@ -198,17 +198,17 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
         elif what == "torque" and freedom == own:
             of_drive["torque"] = value
         elif name in of_motor:
-            torque = name.rpartition(".")[0]
-            motor = motors.get(torque) or _find_motor(mechanism, drive, name)
+            motor = _find_motor(mechanism, drive, name)
             if motor is not None:
-                motors[torque] = replace(motor, **{of_motor[name][0]: value})
+                motors.setdefault(name.rpartition(".")[0], (motor, {}))[1][of_motor[name][0]] = value
         elif name in forces:
             acting[name] = value
         else:
             of_mechanism[field_name(name)] = value
     if acting:
         of_drive["forces"] = {**drive.forces, **acting}
-    for torque, motor in motors.items():
+    for torque, (before, changes) in motors.items():
+        motor = replace(before, **changes)
         if torque in drive.motors:
             of_drive["motors"] = {**of_drive.get("motors", drive.motors), torque: motor}
         else:
