@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, ulp
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 from linkwork.plant import check_tolerance
 
-from ..files import Whole, limit, unknown_name
+from ..files import limit, unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si, quantity
 from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published, usual_times
@@ -188,7 +189,7 @@ def simulate(
     return solve(run, _solver(method), dict(options), progress)
 
 
-def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:
+def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: Any) -> Settings:
     """Check the settings of a run and return them as `Settings`.
 
     Raises
@@ -200,8 +201,9 @@ def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: fl
     check_tolerance(tolerance)
     if hold is not None:
         _check_hold(hold, times)
-    most = Whole(least=1)(max_steps, "max_steps")
-    return Settings(times=times, hold=hold or 0.0, tolerance=tolerance, max_steps=most)
+    if isinstance(max_steps, bool) or not isinstance(max_steps, Integral) or max_steps < 1:
+        raise ParameterError("max_steps", max_steps, "be a whole number, at least 1")
+    return Settings(times=times, hold=hold or 0.0, tolerance=tolerance, max_steps=int(max_steps))
 
 
 def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:

@@ -124,10 +124,12 @@ def apart(a: float, b: float, span: float = TURN) -> float:
 def test_margins_over_the_turn_are_the_extremes_of_a_scan(drawn: tuple[SliderCrankParameters, float]) -> None:
     par, shift = drawn
     angles = np.linspace(0.0, TURN, 2001)
-    scan = par.rod_length - np.sqrt(par.rod_length**2 - squares(par, shift, angles))
+    # squares of the rod's projection on the guide, which have no corner where the rod is across it
+    scan = par.rod_length**2 - squares(par, shift, angles)
     least, greatest = (find(par, M.constant_shift(shift)) for find in (M.assembly_margin, M.greatest_margin))
-    assert scan.min() + 1e-13 >= least.length == pytest.approx(scan.min(), abs=1e-4)
-    assert scan.max() - 1e-13 <= greatest.length == pytest.approx(scan.max(), abs=1e-4)
+    highest, lowest = ((par.rod_length - margin.length) ** 2 for margin in (least, greatest))
+    assert scan.max() - 1e-13 <= highest == pytest.approx(scan.max(), abs=1e-4)
+    assert scan.min() + 1e-13 >= lowest == pytest.approx(scan.min(), abs=1e-4)
     for margin in (least, greatest):
         assert 0.0 <= margin.crank_angle < TURN
         there = squares(par, shift, np.array([margin.crank_angle]))[0]

@@ -139,7 +139,7 @@ def judge_detection() -> Statement:
         "solution at the previous angle (L465)",
         f"none for the shares; a loop is open above {NOTHING:g} rad, for rounding errors",
         (
-            at_most("it does not settle at every angle", 0.0, missed),
+            at_most("it fails to settle at some angle", 0.0, missed),
             at_most("it settles, and a loop is open", 0.0, wrong),
         ),
         "the iteration settles where its steps become small, and this does not mean that the loop is closed (erratum 1)",

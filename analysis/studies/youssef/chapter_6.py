@@ -174,7 +174,7 @@ def _bounded() -> tuple[Statement, ...]:
             "The resulting minimum error is now 53.6 cm2 which when compared with the error resulting from the "
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, with a1 = -93.8 deg (erratum 11), "
+            f"sum of the squared distances of the printed linkage at {N} crank angles, with alpha1 = -93.8 deg (erratum 11), "
             f"{ROUNDED}; increase over the error of Fig 6.4, rounded likewise",
             HALF,
             (

@@ -356,7 +356,7 @@ def _simplification() -> list[Statement]:
             text("4.3, eq (4.22), L2801-2837"),
             "size of the means of K and F of the right linear equation, divided by the mean of the spring's factor, at the "
             "end of each of Figs 5.1 to 5.3 where they are greatest; sigma2 = 0.05 and sigma3 = 1 unless the row names "
-            "another value",
+            "another value, and then on the same ground link",
             f"{SMALL:g}, the rule for *small*, as *<<* says",
             tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
             "the smallness of epsilon is not judged, since epsilon has no value",

@@ -86,7 +86,7 @@ def compute() -> StudyResult:
                     ),
                     at_most("height of the crank shaft", line, above, "cm"),
                 ),
-                "th20 is not printed, so that any 120 deg count as the first. Of the two closures we take the better, see "
+                "theta20 is not printed, so that any 120 deg count as the first. Of the two closures we take the better, see "
                 "L4804",
             ),
             Statement(

@@ -403,8 +403,8 @@ def judge_techniques() -> tuple[Statement, ...]:
             "Another useful technique is to perform the optimisation for a decreased number of linkage parameters and "
             "to use the values obtained in the initial guesses of the complete optimisation programme.",
             text("6.3.1, L4359"),
-            f"rank test as at L4349, for {RANKED} searches that begin with X0, Y0, l2, a1 and th20 alone, or with all ten "
-            "parameters but a2 (our choice, since the thesis names neither which nor how many)",
+            f"rank test as at L4349, for {RANKED} searches that begin with X0, Y0, l2, alpha1 and theta20 alone, or with all "
+            "ten parameters but alpha2 (our choice, since the thesis names neither which nor how many)",
             LEVEL,
             (*by_chance(five, "five"), *by_chance(nine, "nine")),
             "five gain nothing; with nine the errors are lower, for more evaluations",
