@@ -475,8 +475,8 @@ def _torque_causes() -> list[Statement]:
             "torque.",
             text("3.2.1, L2013-2017"),
             f"difference of the torque that supplies the damper's power, as a share of {difference}. The rest changes the "
-            "energies of links and spring. The shares of the rows before are of another kind: parts of the crank's equation, in "
-            "which the damper does not occur",
+            "energies of links and spring. The shares of the rows before are of another kind: parts of the crank's equation, "
+            "in which the damper does not occur",
             f"more than {ALIKE:g}, the rule for *the same*",
             tuple(at_least(name, ALIKE, x) for name, x in shares["damper"].items()),
         ),
