@@ -233,7 +233,7 @@ class TestForces:
         for place in (end, 360.0 - end):
             assert f"limit of assembly at {place:.2f} deg" in result.output
         for name, cells in rows(result.output).items():
-            for angle in cells[2::2]:
+            for angle in filter(None, cells[2::2]):  # constants have none
                 assert 45.4 < float(angle) < 314.6 or name == "slider position", name
         # it does from 35.3 to 324.7 deg: 12 c + 20 is there sqrt(30^2 - 3.5^2)
         assert "the rod does not reach the guide at 16 of 73 crank angles" in " ".join(result.stderr.split())
