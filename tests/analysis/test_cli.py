@@ -443,11 +443,16 @@ def test_stability_judges_the_motion_that_a_weak_motor_reaches(linkwork):
         assert "2 other periodic motions there" in result.output
 
 
-@pytest.mark.slow
-def test_a_chart_of_another_motion_than_the_machine_reaches_is_noted(linkwork, tmp_path, monkeypatch):
+@pytest.fixture
+def coarse_charts(tmp_path, monkeypatch):
+    """Few lines and samples of charts, whose rows are kept for the test alone."""
     monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
     monkeypatch.setattr(charts, "LINES", (2, 2))
     monkeypatch.setattr(charts, "SAMPLES", 12)
+
+
+@pytest.mark.slow
+def test_a_chart_of_another_motion_than_the_machine_reaches_is_noted(linkwork, coarse_charts):
     result = linkwork(
         "stability", EXAMPLES / "capture.toml", "--x", "slider.stiffness", "--x-range", "7900", "8100",
         "--y-range", "2", "4", "--points", "2", "--jobs", "1",
@@ -456,10 +461,7 @@ def test_a_chart_of_another_motion_than_the_machine_reaches_is_noted(linkwork, t
 
 
 @pytest.mark.slow
-def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, monkeypatch):
-    monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
-    monkeypatch.setattr(charts, "LINES", (2, 2))
-    monkeypatch.setattr(charts, "SAMPLES", 12)
+def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, coarse_charts):
     # with so soft a spring the links come to the limit of assembly
     result = linkwork(
         "stability", "--published", "table-3.1", "--x", "slider.stiffness", "--x-range", "150", "400",

@@ -21,7 +21,7 @@ from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import SAME, Drive, assembly_ranges
-from ..motion.flow import GAP, IN_LANES, PLAIN, TOLERANCE, VARIATIONAL, Flow, multipliers
+from ..motion.flow import GAP, IN_LANES, PLAIN, TOLERANCE, VARIATIONAL, Flow, index, multipliers
 from ..motion.orbit import PeriodicOrbit, require_turns, solve_orbit
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
@@ -173,7 +173,7 @@ def coexistence(
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
     )
-    whole = 0 if rows[0].flow.angle_periods.any() else 1
+    whole = rows[0].flow.index_of_all
     _seek_from_neighbours(operation, xs, ys, data, whole)
     return Coexistence(
         x=xs,
@@ -205,17 +205,17 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
     angles = np.linspace(0.0, first.flow.period, SAMPLES, endpoint=False)
     points = Points(*map(np.vstack, zip(*[row.points() for row in rows])))
     kernels.solve_all(section, points, first.search(), m, angles, guesses, Motions(starts, monodromies, swings, counts))
-    largest, index = np.full((2, count, MOST_ORBITS), np.nan)
+    largest, signs = np.full((2, count, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     of = monodromies[found].reshape(-1, n, n)
     largest[found] = np.abs(multipliers(of))[:, 0]
-    index[found] = np.sign(np.linalg.det(np.eye(n) - of))
+    signs[found] = index(of)
     # evaluate the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
     fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan
-    whole = np.concatenate([largest[..., None], amplitude[..., None], index[..., None], starts], axis=2)
+    whole = np.concatenate([largest[..., None], amplitude[..., None], signs[..., None], starts], axis=2)
     return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, n + 3)
 
 
@@ -233,13 +233,13 @@ def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data
     fresh = np.ones(data.shape[:2], dtype=bool)
     while fresh.any():
         tried, fresh = fresh, np.zeros_like(fresh)
-        index, counts = _indices(data), np.isfinite(data[..., 0]).sum(axis=2)
-        for j, i in zip(*np.nonzero(index != whole)):
+        sums, counts = _indices(data), np.isfinite(data[..., 0]).sum(axis=2)
+        for j, i in zip(*np.nonzero(sums != whole)):
             point = operating_point(*operation(float(xs[i]), float(ys[j])))
             for row, column in product((j - 1, j, j + 1), (i - 1, i, i + 1)):
                 if not (0 <= row < len(ys) and 0 <= column < len(xs) and tried[row, column]):
                     continue
-                if counts[row, column] and (counts[row, column] > counts[j, i] or index[row, column] == whole):
+                if counts[row, column] and (counts[row, column] > counts[j, i] or sums[row, column] == whole):
                     starts = data[row, column, : counts[row, column], 3:]
                     fresh[j, i] |= _add_motions(point, starts, data[j, i], whole)
 
@@ -259,8 +259,12 @@ def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, wh
         except OrbitError:
             continue
         if all(orbit.distance(known) > SAME for known in into[:count, 3:]):
-            index = np.sign(np.linalg.det(np.eye(len(start)) - orbit.monodromy))
-            into[count] = orbit.largest, orbit.amplitude, index, *point.flow.nearest_to_rest(orbit.start)
+            into[count] = (
+                orbit.largest,
+                orbit.amplitude,
+                index(orbit.monodromy),
+                *point.flow.nearest_to_rest(orbit.start),
+            )
             count += 1
     into[:count] = into[np.argsort(into[:count, 1], kind="stable")]
     return count > before

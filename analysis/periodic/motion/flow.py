@@ -211,6 +211,11 @@ class Flow:
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
+    def index_of_all(self) -> int:
+        """Return the sum of the indices of all motions: 0 if a link may go round, otherwise 1; see `Orbits.index_of_all`."""
+        return 0 if self.angle_periods.any() else 1
+
+    @property
     def turns(self) -> int:
         """Return the number of turns of the crank in the common period: more than one if other cranks or gears need several."""
         return max(1, round(self.period / (2.0 * pi)))
@@ -580,6 +585,11 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     trace = monodromy[..., 0, 0] + monodromy[..., 1, 1]
     det = monodromy[..., 0, 0] * monodromy[..., 1, 1] - monodromy[..., 0, 1] * monodromy[..., 1, 0]
     return np.asarray(1.0 - multiplier * trace + det)
+
+
+def index(monodromy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the index of motions, the sign of det(I - Phi), from their monodromy matrices Phi, shape (..., n, n)."""
+    return np.sign(crossing_test(monodromy, 1))
 
 
 def torus_pair(multipliers: NDArray[np.complex128]) -> tuple[complex, float]:

@@ -28,7 +28,7 @@ from ...run import Inputs, complete_initial_state, complete_inputs, takes_publis
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
 from .drive import SAME, Drive, Torque, mean_rates, spread_starts, start_ranges, steady_drive
-from .flow import Stability
+from .flow import Stability, index
 from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,
@@ -507,7 +507,7 @@ def _search_rounds(
     require_turns(turns, point, guess)
     ranges = start_ranges(point.parameters, point.drive, guess)
     many, deflated = (_FoundMotions(point, turns, guess, ranges) for _ in range(2))
-    whole = 0 if point.flow.angle_periods.any() else 1
+    whole = point.flow.index_of_all
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
@@ -605,7 +605,7 @@ class _FoundMotions:
         away = np.abs(self.point.flow.remove_turns(passed - orbit.start)) / self.scale
         period = next((n for n in range(1, len(passed)) if away[n].max() < SAME), len(passed))
         self.known = np.vstack([self.known, passed[:period]])
-        self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))
+        self.index += period * int(index(orbit.monodromy))
         if period == len(passed):
             self.orbits.append(orbit)
         return True
