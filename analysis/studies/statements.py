@@ -11,6 +11,8 @@ import numpy as np
 
 #: Kinds of sources: the thesis's text, and its program when run.
 TEXT, LISTING = "text", "listing"
+#: Size below which computed values are rounding errors.
+ROUNDING_ERROR = 1e-9
 #: Possible verdicts.
 HOLDS, IN_PART, FAILS, UNJUDGED = OUTCOMES = ("holds", "holds in part", "does not hold", "cannot be judged")
 
@@ -104,9 +106,14 @@ class Case:
 
     @property
     def found(self) -> str:
-        """Return the computed value with unit, to four digits or one more than the stated number; empty if there is none."""
+        """Return the computed value with unit, to four digits or one more than the stated number; empty if there is none.
+
+        A rounding error, below `ROUNDING_ERROR`, has one digit.
+        """
+        if self.computed is None:
+            return ""
         digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))
-        return "" if self.computed is None else f"{self.computed:.{digits}g} {self.unit}".rstrip()
+        return f"{self.computed:.{1 if abs(self.computed) < ROUNDING_ERROR else digits}g} {self.unit}".rstrip()
 
 
 def near(

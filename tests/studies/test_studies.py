@@ -150,6 +150,13 @@ class TestStatements:
         assert at_least("", 1.0, 1.0).allowed == "at least 1"
         assert not at_most("", "2.0", 2.5).holds
 
+    def test_a_rounding_error_has_one_digit(self) -> None:
+        assert [at_most("", 1e-9, x, "m").found for x in (-8.108e-16, 0.0, 1.2342e-9)] == [
+            "-8e-16 m",
+            "0 m",
+            "1.234e-09 m",
+        ]
+
     def test_bars_do_not_break_the_page(self) -> None:
         """A single case stands in the line of the verdict, several in a table."""
         one = Statement("|x| is 2.", self.PLACE, "|x|", "", (at_most("", "2", 3.0, why="|x| grows"),))
