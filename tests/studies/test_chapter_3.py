@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from analysis.periodic import natural_frequency
 from analysis.run import Inputs, simulate
-from analysis.studies.youssef import chapter_3, formulation, free_crank, integrators, no_spring, runs
+from analysis.studies.youssef import chapter_3, formulation, free_crank, integrators, launches, no_spring, runs
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
@@ -119,6 +119,11 @@ class TestLaunch:
         assert exponent.computed == pytest.approx(published.TORQUE_TIME_EXPONENT, abs=0.005)
         assert np.polyfit(np.log(time), np.log(torque), 1)[0] == pytest.approx(published.TORQUE_TIME_EXPONENT, abs=0.02)
 
+    def test_least_torque_to_four_digits(self) -> None:
+        least = launches.least_torque()
+        assert np.isfinite(launches.release_time(1.0001 * least, stop_time=3.0))
+        assert np.isinf(launches.release_time(0.9999 * least, stop_time=3.0))
+
 
 class TestFreeMotion:
     """Section 3.3."""
@@ -207,6 +212,21 @@ class TestFormulation:
     @pytest.mark.parametrize(("highest", "order"), [(2, 3), (3, 4)])
     def test_series_of_order_four_needs_the_third_derivative(self, highest: int, order: int) -> None:
         assert integrators.order_of_series(highest) == pytest.approx(order, abs=0.1)
+
+    def test_stable_steps_by_the_roots_of_the_methods(self) -> None:
+        """On y' = iy the roots of (2.28) to (2.31), and of Runge-Kutta's polynomial, have a modulus of 1 at the limits."""
+
+        def hamming(z: complex) -> float:
+            columns = []
+            for y, y1, y2, y3, apart in np.eye(5):
+                p = y3 + 4.0 / 3.0 * z * (2.0 * y - y1 + 2.0 * y2)
+                c = (9.0 * y - y2 + 3.0 * z * (p - 112.0 / 121.0 * apart + 2.0 * y - y1)) / 8.0
+                columns.append([c + 9.0 / 121.0 * (p - c), y, y1, y2, p - c])
+            return float(np.abs(np.linalg.eigvals(np.transpose(columns))).max())
+
+        classical, found = integrators.stable_steps(1j)
+        assert classical == pytest.approx(np.sqrt(8.0), rel=1e-4)
+        assert hamming(0.999j * found) < 1.0 < hamming(1.001j * found)
 
     def test_milne_grows_where_hamming_decays(self) -> None:
         """Milne's corrector by steps on y' = -y from a start that is off by 1e-8."""

@@ -55,13 +55,14 @@ described.
 the crank, the more strongly the nearer it comes, so that ten turns look straight only with the two strongest dampers. With
 these two no transient can be seen; with the others the motion never gets steady. Gravity holds the drift back: without it,
 the size of M with these two dampers is greater by a quarter, so that M is not slightly reduced. With the softer springs the
-transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, the mean slope of u
-is 1.6 times that with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the
+transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, u rises 1.6
+times as steeply as with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the
 slope constant. The least value of the torque does vary with the spring, but not because the slider's accelerations differ:
 they make 3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest
 launch the slider moves to both sides of its start. The second harmonic relative to the first goes on growing from 27 down
 to 22 rad/s. It is not an effect non-linear in u, since the equation linear in u has it too. Finally, not every
-predictor-corrector method is stable: Milne's classical one is weakly unstable.
+predictor-corrector method is stable: Milne's classical one is weakly unstable, and for an
+undamped oscillation Hamming's is stable only with steps a tenth as long as Runge-Kutta's.
 """
 
 ANGLE = "crank angle [deg]"
@@ -468,7 +469,8 @@ def _torque_causes() -> list[Statement]:
                 ),
                 Case(label="change in the geometry", computed=moved, lower=ALIKE, upper=SLIGHTLY),
             ),
-            "the slider's rates cancel part of the effect of its position. *No external load* is not judged",
+            "the slider's rates cancel part of the effect of its position. *No external load* is not judged, since it can mean "
+            "that the spring exerts no force, which is wrong, or that it does no work over a turn, which is so of every spring",
         ),
         Statement(
             "The energy dissipation in the slider guide due to viscous friction also accounts for variations in "

@@ -416,10 +416,14 @@ def stiff_phase_plane() -> StudyResult:
     # the speeds at which the second harmonic is greatest: over the first, and over its force
     most, resonance = (stiff.speed[(stiff.second / by).argmax()] for by in (stiff.first, stiff.speed**2))
     parameters, over_turn = table_3_1(STIFF), half_natural_frequencies(STIFF)
-    half = 0.5 * natural_frequency(parameters)
+    half, about = 0.5 * natural_frequency(parameters), ABOUT * HARMONIC_SPEED
     # an oscillator with this damping ratio swings most at sqrt(1 - 2 ratio^2) of its natural frequency
     ratio = parameters.slider_damping * half / parameters.slider_stiffness
-    lowered = 1.0 - np.sqrt(1.0 - 2.0 * ratio**2)
+    lowered = round(1.0 - float(np.sqrt(1.0 - 2.0 * ratio**2)), 3)
+    # its response at twice the speed relative to that at the speed
+    share = np.linspace(0.2, 1.0, 801)
+    response, twice = (np.abs(1.0 - x**2 + 2j * ratio * x) ** -1 for x in (0.5 * share, share))
+    one_mass = half * float(share[(twice / response).argmax()])
     return _phase_plane(
         "3.14",
         STIFF,
@@ -432,17 +436,18 @@ def stiff_phase_plane() -> StudyResult:
             f"squared, are greatest; the motion is followed beyond the plot, down to {stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
-                at_least("at 27 rad/s", 1.0, seen[0] / seen[1]),
-                near("speed, over the speed squared", "27", resonance, ABOUT * HARMONIC_SPEED, "rad/s"),
+                at_least("ratio at 27 rad/s", 1.0, seen[0] / seen[1]),
+                near("speed of the greatest second harmonic over the speed squared", "27", resonance, about, "rad/s"),
                 near(
-                    "speed, over the first",
+                    "speed of the greatest ratio",
                     "27",
                     most,
-                    ABOUT * HARMONIC_SPEED,
+                    about,
                     "rad/s",
                     why=(
-                        f"the ratio goes on growing down to {most:.0f} rad/s, because the damper lowers and broadens the "
-                        "resonance"
+                        f"the ratio goes on growing down to {most:.0f} rad/s; with this damper, and forces that grow with the "
+                        f"square of the speed, that of a single mass is greatest at {one_mass:.0f} rad/s, not at half its "
+                        "natural frequency"
                     ),
                 ),
             ),
@@ -452,7 +457,7 @@ def stiff_phase_plane() -> StudyResult:
             text("3.3, L2301-2305"),
             "half the natural frequency, computed with the mean effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
             f"{ABOUT:g}, the rule for *approximately*",
-            (near("", "27", half, 27.0 * ABOUT, "rad/s"),),
+            (near("", "27", half, about, "rad/s"),),
         ),
         Statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",

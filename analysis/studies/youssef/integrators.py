@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import exp, factorial, log2
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ def runge_kutta(
     return RungeKutta(np.array(states), evaluations)
 
 
+@cache
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
     """Return the greatest stable steps for y' = ``rate`` y (of y'' = -y where it is 1j) by Runge-Kutta's and Hamming's method.
 
@@ -64,7 +66,7 @@ def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
     found = []
     for method in (classical, hamming):
         low, high = 0.1, 4.0
-        while high - low > 1e-3:
+        while high - low > 1e-5:
             middle = 0.5 * (low + high)
             before, last = np.abs(method(middle)[-100:]).reshape(2, 50).max(axis=1)
             low, high = (middle, high) if last < before else (low, middle)

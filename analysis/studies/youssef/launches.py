@@ -82,9 +82,9 @@ def run_acceleration(torque: float, stiffness: float = 1e6) -> Trajectory:
 
 
 def least_torque() -> float:
-    """Find the least T0 (dyn.cm) that turns the crank from rest by 1 rad, to half a per cent."""
+    """Find the least T0 (dyn.cm) that turns the crank from rest by 1 rad, to four digits."""
     low, high = 1e5, 1e7
-    while high / low > 1.01:
+    while high / low > 1.0001:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if np.isfinite(release_time(middle, stop_time=3.0)) else (middle, high)
     return float(np.sqrt(low * high))

@@ -269,7 +269,7 @@ def _kinematics() -> list[Statement]:
     return [
         Statement(
             "The angles [alpha] and [alpha3] are then calculated accordingly.",
-            text("4.1, eqs (4.1), (4.6), L2404-2417"),
+            text("4.1, eqs (4.1), (4.6), L2404-2417; (4.6) at L2452-2458"),
             "datum by (4.1) and (4.6), compared with ALF, ALF3, ALF4 of appendices 2 to 4 (L8404; 120.99. is read as "
             "120.,9.), for sigma2 = 0.05, sigma3 = 1 and sigma = 1, which the thesis does not state but which give its "
             "angles",
