@@ -6,7 +6,16 @@ from numpy.typing import NDArray
 
 from analysis.periodic import natural_frequency
 from analysis.run import Inputs, simulate
-from analysis.studies.youssef import chapter_3, formulation, free_crank, integrators, launches, no_spring, runs
+from analysis.studies.youssef import (
+    chapter_3,
+    formulation,
+    free_crank,
+    integrators,
+    launches,
+    multipliers,
+    no_spring,
+    runs,
+)
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
@@ -84,10 +93,10 @@ class TestSteadyMotion:
 
     def test_parts_of_the_torque(self) -> None:
         """The weights by virtual work, the whole by the multiplier of 3.1."""
-        turn, found, p = runs.steady_turn(runs.table_3_1(1e6), 420.0), chapter_3.parts(1e6), formulation.TABLE
+        turn, found, p = runs.steady_turn(runs.table_3_1(1e6), 420.0), chapter_3.parts(1e6), multipliers.TABLE
 
         def potential(crank: float, u: float) -> float:
-            q, _ = formulation.closed_loop_state(crank, u, 0.0, 0.0)
+            q, _ = multipliers.closed_loop_state(crank, u, 0.0, 0.0)
             coupler = p.crank_length * np.sin(crank) + p.coupler_cog_distance * np.sin(q[1])
             return p.gravity * (p.coupler_mass * coupler + p.rocker_mass * p.rocker_cog_distance * np.sin(q[2]))
 
@@ -96,7 +105,7 @@ class TestSteadyMotion:
             crank, u = np.radians(turn.angle_deg[i]), turn.slider_cm[i] / 100.0
             weight = (potential(crank + 1e-5, u) - potential(crank - 1e-5, u)) / 2e-5
             assert found.gravity[i] == pytest.approx(weight, abs=1e-8)
-            w = formulation.solve_multipliers(*formulation.closed_loop_state(crank, u, formulation.OMEGA, rate[i]))
+            w = multipliers.solve_multipliers(*multipliers.closed_loop_state(crank, u, multipliers.OMEGA, rate[i]))
             assert found.whole[i] == pytest.approx(w[0], abs=1e-3)
 
     def test_distance_on_a_graph_is_square_to_the_curve(self) -> None:
@@ -190,11 +199,20 @@ class TestFormulation:
     """Chapter II and section 3.1."""
 
     def test_start_is_that_of_the_independent_derivation(self) -> None:
-        w = formulation.solve_multipliers(*formulation.closed_loop_state(0.0, 0.0, formulation.OMEGA, 0.0))
+        w = multipliers.solve_multipliers(*multipliers.closed_loop_state(0.0, 0.0, multipliers.OMEGA, 0.0))
         assert w[0] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * published.DYN_CM, rel=1e-9)
 
+    def test_multipliers_of_the_loop_broken_at_b_and_at_c_carry_the_coupler(self) -> None:
+        """Their difference is the mass of the coupler times its acceleration, and its weight."""
+        p, where = multipliers.TABLE, multipliers.closed_loop_state(0.7, -0.01, multipliers.OMEGA, 0.2)
+        _, at_b, at_c, _ = multipliers.broken_loop_forces(*where)
+        (th2, th3, *_), (w2, w3, *_), rate = *where, multipliers.solve_multipliers(*where)[5]
+        crank, arm = p.crank_length * np.exp(1j * th2), p.coupler_cog_distance * np.exp(1j * th3)
+        acceleration = -(w2**2) * crank + (1j * rate - w3**2) * arm
+        assert at_c - at_b == pytest.approx(p.coupler_mass * (acceleration + 1j * p.gravity), rel=1e-9)
+
     def test_equations_of_chapter_2_but_for_a_cosine(self) -> None:
-        found = formulation.chapter_2_residuals()
+        found = multipliers.chapter_2_residuals()
         assert len(found) == 10
         assert [name for name, residual in found.items() if residual > 1e-12] == ["(2.20)"]
 

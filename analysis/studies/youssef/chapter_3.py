@@ -39,30 +39,29 @@ from .runs import (
 
 FINDINGS = """\
 **Claims.** Chapter II and section 3.1 write the equations of motion with Lagrange's multipliers, state that these are the pin
-forces, and advise integrating all second derivatives, so that the closure of the loop checks the integration.
-Sections 3.2 and 3.3 compute the linkage of Table 3.1: without a spring, with three springs, launched by a torque, and in free
-motion.
+forces, and advise integrating all second derivatives, so that the closure of the loop checks the integration. Sections 3.2 and
+3.3 compute the linkage of Table 3.1: without a spring, with three springs, launched by a torque, and in free motion.
 
-**What stands.** The equations of motion are right, except for a cosine in (2.20) that must be a sine; so are (3.8) and
-(3.10), except for a minus that our scan lacks. The multipliers are the force at C and the crank torque. At constant speed the
-failure of closure does show the error of the integration: it is some five to fifteen times the slider's error. In a launch
-with short steps it is far smaller than the error. The program of appendix 1 prints the closure but integrates the slider
-alone, so that its own check shows nothing. The torque reverses near 0 deg and hardly depends on the spring. The linear rise
-of the speed in a launch, the decay by the damper, the phase planes, and half the natural frequency near 27 rad/s are as
-described.
+**What stands.** The equations of motion are right, except for a cosine in (2.20) that must be a sine; so are (3.8) and (3.10),
+except for a minus that our scan lacks. The multipliers are the crank torque and the force in the pin where the loop is broken,
+C in (3.8). At constant speed the failure of closure does show the error of the integration: it is some five to fifteen times
+the slider's error. In a launch with short steps it is far smaller than the error. The program of appendix 1 prints the closure
+but integrates the slider alone, so that its own check shows nothing. The torque reverses near 0 deg and hardly depends on the
+spring. The linear rise of the speed in a launch, the decay by the damper, the phase planes, and half the natural frequency
+near 27 rad/s are as described.
 
 **What does not.** Without a spring the slider does not drift along a line. The mean of the inertia forces pushes it towards
 the crank, the more strongly the nearer it comes, so that ten turns look straight only with the two strongest dampers. With
-these two no transient can be seen; with the others the motion never gets steady. Gravity holds the drift back: without it,
-the size of M with these two dampers is greater by a quarter, so that M is not slightly reduced. With the softer springs the
-transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, u rises 1.6
-times as steeply as with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the
-slope constant. The least value of the torque does vary with the spring, but not because the slider's accelerations differ:
-they make 3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest
-launch the slider moves to both sides of its start. The second harmonic relative to the first goes on growing from 27 down
-to 22 rad/s. It is not an effect non-linear in u, since the equation linear in u has it too. Finally, not every
-predictor-corrector method is stable: Milne's classical one is weakly unstable, and for an
-undamped oscillation Hamming's is stable only with steps a tenth as long as Runge-Kutta's.
+these two no transient can be seen; with the others the motion never gets steady. Gravity holds the drift back: without it, the
+size of M with these two dampers is greater by a quarter, so that M is not slightly reduced. With the softer springs the
+transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, u rises 1.6 times as
+steeply as with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the slope
+constant. The least value of the torque does vary with the spring, but not because the slider's accelerations differ: they make
+3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the
+slider moves to both sides of its start. The second harmonic relative to the first goes on growing from 27 down to 22 rad/s. It
+is not an effect non-linear in u, since the equation linear in u has it too. Finally, not every predictor-corrector method is
+stable: Milne's classical one is weakly unstable, and for an undamped oscillation Hamming's is stable only with steps a tenth
+as long as Runge-Kutta's.
 """
 
 ANGLE = "crank angle [deg]"

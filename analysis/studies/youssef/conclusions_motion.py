@@ -12,9 +12,10 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SEEN_FALL, SMALL
 from ..statements import Statement, at_least, at_most, near, text
 from .chapter_3 import graph_distance, run_from_rest
-from .formulation import judge_closure, judge_multipliers
+from .formulation import judge_closure
 from .free_crank import Turns
 from .launches import TORQUES, launch, run_acceleration, run_peak
+from .multipliers import judge_multipliers
 from .no_spring import COLLINEAR_SINE, DAMPINGS, FEWEST_TURNS, TRANSIENT_TURNS, drift
 from .runs import PERIOD, SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 

@@ -1,6 +1,5 @@
-"""Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and their integration.
+"""Section 3.1: the integration of the equations with Lagrange's multipliers.
 
-The equations are exactly those of the thesis; their results are compared with those of the plant, which has no multipliers.
 By the first approach of section 3.1 all coordinates are integrated, and the loop does not stay closed exactly. By the second
 only the independent coordinates are integrated: the slider position u, and in a launch the crank angle th2. The others follow
 from the closure of the loop. A launch, section 3.2.2, is a motion from rest under a torque that falls to zero at th2 = 1 rad.
@@ -11,160 +10,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from linkwork.five_bar import dynamics, kinematics
-
 from ...figures import Figure, Panel, plot_curves
-from ...run import Hamming, Inputs, TorsionBar, simulate
-from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ...run import Hamming
+from ...units import CM_PER_METRE
 from ..rules import SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, result_curves
 from .integrators import CLASSICAL, SLIP, order_of_series, runge_kutta, spurious_root, stable_steps
-from .runs import SPEED, table_3_1
+from .multipliers import OMEGA, ROUNDING, TABLE, TORQUE, chapter_2_statements, closed_loop_state, solve_multipliers
 
-#: The mechanism, its speed (rad/s), the duration of the motion (s), and the steps (s); appendix 1 begins with 1e-3 s.
-TABLE = table_3_1(1e6)
-OMEGA, STOP = SPEED * RAD_S_PER_RPM, 0.5
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+#: Duration of the motion, and steps (s); appendix 1 begins with 1e-3 s.
+STOP, STEPS = 0.5, (4e-3, 2e-3, 1e-3, 5e-4)
 #: Step (s) with which the errors are large.
 LONG_STEP = 1e-2
-#: Torque of the launch that is compared (N.m), and greatest relative rounding error of a solution.
-TORQUE, ROUNDING = 10.0, 1e-9
 #: Why the closure does not show the error of a launch.
 KINK = "the step in which the torque of the launch ends leaves an error along the motion, while the loop stays closed"
 #: Step (s) with which appendix 1 begins: there the estimate of Hamming's method is judged.
 STEP = 1e-3
-#: Mechanism with all the lengths and angles of Fig 2.1, and without a spring; force F1 at P (N, x + iy) and force F2 (N).
-FULL = replace(
-    TABLE, slider_stiffness=0.0, crank_mass=0.15, crank_cog_distance=0.02, coupler_cog_angle=0.1, slider_guide_angle=0.2,
-    ground_inclination=0.3, coupler_point_distance=0.06, coupler_point_angle=0.4,
-)  # fmt: skip
-LOAD, FORCE = 3.0 - 2.0j, 4.0
 #: Errors (m) with which this estimate is tested: of the start, and the unit to which the back values are rounded.
 START_ERROR, UNIT = 1e-5, 1e-6
-
-
-def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
-    """Solve A W = B, eqs (3.1), (3.8), (3.10), for W at q = (th2, th3, th4, u) and q' = ``qd`` (SI).
-
-    W = (lambda3, lambda2, lambda1, u'', th4'', th3''). If a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
-    """
-    q, qd, p = np.asarray(q), np.asarray(qd), TABLE
-    m3, m4, r3, r4, g = p.coupler_mass, p.rocker_mass, p.coupler_cog_distance, p.rocker_cog_distance, p.gravity
-    (x2, x3, x4), (y2, y3, y4) = (
-        (p.crank_length, p.coupler_length, p.rocker_length) * f(q[:3]) for f in (np.cos, np.sin)
-    )
-    w2, w3, w4 = qd[:3] ** 2
-    couple = m3 * p.crank_length * r3 * np.exp(1j * (q[0] - q[1]))
-    lift4, sway4 = m4 * r4 * np.sin(q[2]), m4 * r4 * np.cos(q[2])
-    a = [
-        [-1.0, -x2, y2, 0.0, 0.0, couple.real],
-        [0.0, -x3, y3, 0.0, 0.0, p.coupler_inertia + m3 * r3**2],
-        [0.0, x4, -y4, -lift4, p.rocker_inertia + m4 * r4**2, 0.0],
-        [0.0, 0.0, 1.0, m4 + p.slider_mass, -lift4, 0.0],
-        [0.0, 0.0, 0.0, 1.0, -y4, y3],
-        [0.0, 0.0, 0.0, 0.0, -x4, x3],
-    ]
-    b = [
-        -m3 * g * x2 - couple.imag * w3,
-        -m3 * g * r3 * np.cos(q[1]) + couple.imag * w2,
-        -g * sway4,
-        -p.slider_damping * qd[3] - p.slider_stiffness * q[3] + sway4 * w4,
-        -x2 * w2 - x3 * w3 + x4 * w4,
-        y2 * w2 + y3 * w3 - y4 * w4,
-    ]
-    if torque is not None:
-        for row, entry in ((0, p.crank_inertia + m3 * p.crank_length**2), (1, couple.real), (4, y2), (5, x2)):
-            a[row][0] = entry
-        b[0] += torque
-    unknowns: NDArray[np.float64] = np.linalg.solve(a, b)
-    return unknowns
-
-
-def chapter_2_residuals() -> dict[str, float]:
-    """Return the greatest residual of each equation (2.11) to (2.21) in motions of the plant, relative to its greatest term.
-
-    The crank turns at constant speed, and then under a torque.
-    """
-    p, worst, load = FULL.constants(), dict[str, float](), LOAD * np.exp(-1j * FULL.ground_inclination)
-    for drive, th in ((drive, th) for drive in (1.0, 0.0) for th in np.linspace(0.0, 6.0, 25).tolist()):
-        u, w, v = 0.01 * cos(2.0 * th), OMEGA, 0.3 * sin(th + 1.0)
-        state, inputs = (th, u, w, v, 0.0, 0.0), dynamics.Inputs(drive, TORQUE, 0.0, FORCE, load.real, load.imag)
-        g = kinematics.position(th, u, p)
-        m = dynamics.motion(g, kinematics.coefficients(g, p), state, inputs, p)
-        pins = dynamics.reactions(g, state, m, inputs, p)
-        for name, terms in chapter_2_terms(th, kinematics.link_angles(g, p), w, v, m, pins).items():
-            # (2.11), (2.12), (2.15) and (2.16) are for constant speed, (2.18) to (2.21) for a torque
-            if (name in ("(2.13)", "(2.14)")) or (name < "(2.17)") == bool(drive):
-                worst[name] = max(worst.get(name, 0.0), abs(sum(terms)) / max(map(abs, terms)))
-    return worst
-
-
-def chapter_2_terms(
-    th2: float, links: tuple[float, float], w: float, v: float, m: dynamics.Motion, pins: dynamics.Reactions
-) -> dict[str, tuple[float, ...]]:
-    """Return the terms of each equation (2.11) to (2.21) as in the scanned text; ``links`` are th3 and th4 + alpha (rad)."""
-    q, p, (th3, th4), g, x, y = FULL, FULL.constants(), links, FULL.gravity, pins.cx, pins.cy
-    alpha, alpha1, swing = q.slider_guide_angle, q.ground_inclination, th2 - th3 - q.coupler_cog_angle
-    tilt2, tilt3, point = th2 + alpha1, th3 + q.coupler_cog_angle + alpha1, th3 + q.coupler_point_angle + alpha1
-    m3r3, m4r4 = q.coupler_mass * q.coupler_cog_distance, q.rocker_mass * q.rocker_cog_distance
-    (x2, y2), (x3, y3), (x4, y4) = (
-        (length * cos(at), length * sin(at)) for length, at in ((p.l2, th2), (p.l3, th3), (p.l4, th4))
-    )
-    crank = (
-        m3r3 * p.l2 * cos(swing) * m.e3,
-        m3r3 * p.l2 * sin(swing) * m.w3**2,
-        x * y2,
-        -y * x2,
-        -m.torque,
-        (p.m2 * q.crank_cog_distance + p.m3 * p.l2) * g * cos(tilt2),
-        LOAD.real * p.l2 * sin(tilt2),
-        -LOAD.imag * p.l2 * cos(tilt2),
-    )
-    coupler = (
-        p.i3b * m.e3,
-        -m3r3 * p.l2 * sin(swing) * w**2,
-        x * y3,
-        -y * x3,
-        m3r3 * g * cos(tilt3),
-        LOAD.real * q.coupler_point_distance * sin(point),
-        -LOAD.imag * q.coupler_point_distance * cos(point),
-    )
-    slider = (x * cos(alpha), y * sin(alpha), p.m45 * g * sin(alpha + alpha1), -FORCE, p.mu * v)
-    e2, a = m.crank_acceleration, m.slider_acceleration
-    along = (y3 * m.e3, a * cos(alpha), x2 * w**2, x3 * m.w3**2, -x4 * m.w4**2)
-    across = (x3 * m.e3, -x4 * m.e4, -a * sin(alpha), -y2 * w**2, -y3 * m.w3**2, y4 * m.w4**2)
-    sin4, cos4 = sin(th4 - alpha), cos(th4 - alpha)
-    return {
-        "(2.11)": crank,
-        "(2.12)": coupler,
-        "(2.13)": (p.i4d * m.e4, -m4r4 * sin4 * a, -x * y4, y * x4, m4r4 * g * cos(th4 + alpha1)),
-        "(2.14)": (p.m45 * a, -m4r4 * sin4 * m.e4, -m4r4 * cos4 * m.w4**2, *slider),
-        "(2.15)": (*along, -y4 * m.e4),
-        "(2.16)": across,
-        "(2.18)": (p.i2b * e2, *crank),
-        "(2.19)": (m3r3 * p.l2 * cos(swing) * e2, *coupler),
-        "(2.20)": (y2 * e2, *along, -x4 * m.e4),
-        "(2.21)": (x2 * e2, *across),
-    }
-
-
-def closed_loop_state(
-    crank: float, u: float, speed: float, velocity: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return q and q' of the closed loop, eqs (2.1) and (2.4), at a crank angle, u and their rates (SI)."""
-    p = TABLE.constants()
-    g = kinematics.position(crank, u, p)
-    k = kinematics.coefficients(g, p)
-    rates = [speed, k.k32 * speed + k.k3u * velocity, k.k42 * speed + k.k4u * velocity, velocity]
-    return np.array([crank, *kinematics.link_angles(g, p), u]), np.array(rates)
 
 
 def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -376,26 +246,6 @@ def evaluations_a_step() -> float:
     return float((more - fewer) / (long - short))
 
 
-def judge_multipliers() -> tuple[Case, ...]:
-    """Compare the multipliers with torque and force of the plant, at constant speed and under a torque."""
-    worst: dict[str, float] = {}
-    force = {"force at C in y": ("pin.C.fy", 1), "force at C in x": ("pin.C.fx", 2)}
-    for drive, inputs, compared in (
-        ("constant speed", Inputs(speed=OMEGA), {"crank torque": ("drive.applied_torque", 0), **force}),
-        ("torque", Inputs(torque=TorsionBar(torque=TORQUE)), force),
-    ):
-        run = simulate(TABLE, inputs, stop_time=0.3, step=0.003)
-        for i in range(1, len(run)):
-            where = closed_loop_state(
-                *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
-            )
-            w = solve_multipliers(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
-            for words, (name, place) in compared.items():
-                label, scale = f"{words}; {drive}", np.abs(run[name]).max()
-                worst[label] = max(worst.get(label, 0.0), abs(w[place] - run[name][i]) / scale)
-    return tuple(at_most(label, ROUNDING, x) for label, x in worst.items())
-
-
 def compute() -> StudyResult:
     """Judge chapter II and section 3.1, and compute the closure error of the loop over time."""
     found = {_step(step): integrate_both(step) for step in STEPS}
@@ -408,28 +258,7 @@ def compute() -> StudyResult:
         "of the loop shows the error of the integration.",
         columns=columns,
         statements=(
-            Statement(
-                "Assuming that [F1x and F1y] are the values of the force F1 in the x and y directions the equations of "
-                "motion may be written as follows : [(2.11) to (2.14)] ... Two of these equations are : [(2.18), (2.19)]",
-                text("2.2, eqs (2.11) to (2.21), L796-934"),
-                "residual of each equation divided by its greatest term, with accelerations, force at C and crank torque by "
-                "our equations of motion, at 25 crank angles; (2.13) and (2.14) at constant speed and under a torque. Table "
-                "3.1, with angles, speeds and forces of ours, so that no term is zero. (2.14) is read with the weight of "
-                "rocker and slider, which is illegible in the scan",
-                f"{ROUNDING:g}, above rounding errors",
-                tuple(at_most(name, ROUNDING, x) for name, x in chapter_2_residuals().items()),
-                "(2.20) has cos(theta4 + alpha) theta4'' where (2.15) has the sine",
-            ),
-            Statement(
-                "[T]he multipliers are equal to the internal forces components and the input torque.",
-                text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
-                "multipliers by (3.1), (3.8) and (3.10), minus crank torque and force at C by our equations of motion, "
-                "which have no multipliers, relative to the greatest value of each. Table 3.1 with k = 1e6 dyn/cm and mu = "
-                "3e4 dyn.s/cm, 0.3 s from u = u' = 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
-                f"{ROUNDING:g}, above rounding errors",
-                judge_multipliers(),
-                "where our scan differs, we read (3.8) with the minus of l2 cos theta2 as in (4.10), and (3.10) with k for k2",
-            ),
+            *chapter_2_statements(),
             *_closure_statements(),
             *_one_step_statements(),
             *_hamming_statements(),
