@@ -58,6 +58,12 @@ def test_peaks(inertia_ratio: float, near: float) -> None:
 class TestLinearised:
     """The equations of 4.1 to 4.4."""
 
+    def test_a_motion_that_is_not_small(self) -> None:
+        """Lagrange's equation of rocker and slider, integrated apart over 600 turns from zeta = 0.3, gives 0.68291 l4."""
+        linear, found = linearised.peaks(study.DAMPERS[0])
+        assert found == pytest.approx(0.68291, abs=2e-5)
+        assert linear > 1.0
+
     def test_the_mended_recurrence_is_the_balance(self) -> None:
         """With 2 lambda_c k0 in place of 2 lambda_c (4.34) is the balance of (4.29); as printed it is not."""
         assert linearised.balance_error(1.2, as_printed=False) < 1e-12

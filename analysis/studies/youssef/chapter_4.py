@@ -37,26 +37,27 @@ from ..study import Study, StudyResult
 from .runs import ALIKE_WORDS, SIGN
 
 FINDINGS = """\
-**Claims.** Sections 4.1 to 4.4 linearise the mechanism about the four-bar with its slider at rest. The result is one
-equation (4.21) with periodic coefficients, of which two harmonics are balanced. Section 4.5 finds that the resonance lies
-within 1 rad/s below the frequency of the spring with rocker and slider alone, that this distance is proportional to the
-rocker's inertia, that the first harmonic is dominant, and how a damper acts on it.
+**Claims.** Sections 4.1 to 4.4 linearise the mechanism about the four-bar with its slider at rest. The result is one equation
+(4.21) with periodic coefficients, of which two harmonics are balanced. Section 4.5 finds that the resonance lies within 1
+rad/s below the frequency of the spring with rocker and slider alone, that this distance is proportional to the rocker's
+inertia, that the first harmonic is dominant, and how a damper acts on it.
 
-**What stands.** The equations of motion (4.10) to (4.20) and the linearised kinematics (4.8) are right. For a massless
-coupler and the rocker's mass centre on the slider, the inertia of (4.21) and its force as in the listing are right to first
-order. The resonance lies below omega_k by about 1 rad/s for each unit of I4, nearly all of it due to the mean of the
-rocker's inertia; at I4 = 0 it is that of a mass on a spring. Amplitudes grow with I4, and so do the widths at a given
-amplitude. The damper acts only near the resonance, where the curves are those of a single mass.
+**What stands.** The equations of motion (4.10) to (4.20) and the linearised kinematics (4.8) are right. For a massless coupler
+and the rocker's mass centre on the slider, the inertia of (4.21) and its force as in the listing are right to first order. The
+resonance lies below omega_k by about 1 rad/s for each unit of I4, nearly all of it due to the mean of the rocker's inertia; at
+I4 = 0 it is that of a mass on a spring. Amplitudes grow with I4, and so do the widths at a given amplitude. The damper acts
+only near the resonance, where the curves are those of a single mass. The motion must be small: with the least damper of
+appendix 2, I4 = 1, the linear equation gives a peak of 1.03 l4, where the mechanism has 0.68.
 
 **What does not.** (4.21) lacks M' zeta', the rate of the periodic mass, and its H1 is three times too large. The expansion
-(4.23) keeps harmonics of second order but not the second-order part of the mean, and (4.34) has lambda_c in place of
-lambda_c k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of spring and damper,
-and its K is wrong. Its resonances are therefore 0.02 to 0.04 rad/s too low at I4 = 0.5 and 1, which its steps of 0.1 rad/s
-hide. The force of (4.21) is right only to first order: its second harmonic is a third of the right one, and a sixth with
-the halved factors, so that the slider's second harmonic is about seven times too small. This is why the thesis could call
-the second harmonic negligible everywhere. In truth it is negligible, at the same speed, only above 22 rad/s, and near half
-the natural frequency it exceeds the first. The frequency of the free motion falls with the damper, by 5 mrad/s, but the
-peaks of the curves, which the figures show, move to higher speeds."""
+(4.23) keeps harmonics of second order but not the second-order part of the mean, and (4.34) has lambda_c in place of lambda_c
+k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of spring and damper, and its K
+is wrong. Its resonances are therefore 0.02 to 0.04 rad/s too low at I4 = 0.5 and 1, which its steps of 0.1 rad/s hide. The
+force of (4.21) is right only to first order: its second harmonic is a third of the right one, and a sixth with the halved
+factors, so that the slider's second harmonic is about seven times too small. This is why the thesis could call the second
+harmonic negligible everywhere. In truth it is negligible, at the same speed, only above 22 rad/s, and near half the natural
+frequency it exceeds the first. The frequency of the free motion falls with the damper, by 5 mrad/s, but the peaks of the
+curves, which the figures show, move to higher speeds."""
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 for which appendix 2 gives the resonance.

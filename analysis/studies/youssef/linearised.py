@@ -17,12 +17,13 @@ from linkwork.five_bar.published import SIGMA2, chapter_4
 from ...figures import Figure, Panel, plot_curves
 from ...numerics.fourier import FourierSeries
 from ...units import RAD_S_PER_RPM
-from ...youssef import Form, SliderEquation, Variant, slider_equation, two_harmonics
+from ...youssef import Form, SliderEquation, Variant, nonlinear_harmonic_balance, slider_equation, two_harmonics
 from ...youssef.printed_coefficients import DATUM, Coefficients, Datum, convert, listed, printed, ratios
-from ..rules import SMALL
+from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, result_curves
-from .runs import SPEED, table_3_1
+from .chapter_4 import DAMPERS, peak
+from .runs import ALIKE_WORDS, SPEED, table_3_1
 
 #: Greatest rounding error, crank lengths sigma2 from which an order is computed, tolerance of a limit at the shorter length.
 ROUNDING, SHORT, LIMIT = 1e-9, (0.002, 0.001), 0.01
@@ -257,7 +258,35 @@ def compute() -> StudyResult:
         "have the period of the crank; lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = "
         "omega_c/omega and omega_c = mu/(m4 + m5).",
         columns=columns,
-        statements=(*_kinematics(), *_equation(), *_simplification(), *_balance()),
+        statements=(_small_motion(), *_kinematics(), *_equation(), *_simplification(), *_balance()),
+    )
+
+
+def peaks(omega_c: float) -> tuple[float, float]:
+    """Return the first harmonic at the peak of the right linear equation with a damper (1/s) at I4 = 1, relative to l4.
+
+    The first value is that of the linear equation, the second that of the mechanism at the same speed.
+    """
+    (speed, linear), mechanism = peak(1, 1.0, omega_c), chapter_4(1.0, omega_c)
+    return linear, nonlinear_harmonic_balance(mechanism, speed).harmonic(1) / mechanism.rocker_length
+
+
+def _small_motion() -> Statement:
+    """Judge the condition of the linearisation."""
+    (large, of_large), (small, of_small) = (peaks(omega_c) for omega_c in (DAMPERS[0], DAMPERS[-1]))
+    return Statement(
+        "It must, however, be appreciated that in order that the results are true and meaningful the motion of the movable "
+        "pivot must be small.",
+        text("IV, L2373-2377"),
+        "first harmonic of u in the motion of the mechanism, not linearised, divided by that of the right linear equation: "
+        f"difference from 1 at the speed of the latter's peak; I4 = 1. omega_c = {DAMPERS[-1]:g} and {DAMPERS[0]:g} 1/s are "
+        "the greatest and the least damper of appendix 2",
+        f"{ALIKE_WORDS}; for a motion that is not small the difference is greater",
+        (
+            at_most(f"motion of {small:.2f} l4, omega_c = {DAMPERS[-1]:g} 1/s", ALIKE, abs(of_small / small - 1.0)),
+            at_least(f"motion of {large:.2f} l4, omega_c = {DAMPERS[0]:g} 1/s", ALIKE, abs(of_large / large - 1.0)),
+        ),
+        f"with the least damper the mechanism has {of_large:.2f} l4 there",
     )
 
 
