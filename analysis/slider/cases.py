@@ -13,6 +13,8 @@ from typing import Any, get_args
 import numpy as np
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.parameters import fmi_name
 
 from .. import files
 from .. import synthesis as syn
@@ -121,6 +123,14 @@ class TrackingTable:
     coulomb_friction: float | None = files.entry(files.Quantity("N", least=0.0), None)
     mass_error: float = files.entry(files.Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
     load_known: bool = files.entry(files.flag, True)
+
+    def plant_values(self, model: FiveBarParameters) -> dict[str, float]:
+        """Return the parameters in which the plant differs from the model, by field name."""
+        heavier = ("coupler_mass", "rocker_mass", "slider_mass", "coupler_inertia", "rocker_inertia")
+        values = {name: getattr(model, name) * (1.0 + self.mass_error) for name in heavier if self.mass_error}
+        if self.coulomb_friction is not None:
+            values["slider_coulomb_friction"] = self.coulomb_friction
+        return values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -276,15 +286,8 @@ class SliderCase:
         """Run the plant, which may differ from the model, under the tracking controller."""
         wanted = self.tracking
         assert wanted is not None
-        model = drive.parameters
-        other: dict[str, Any] = {
-            name: getattr(model, name) * (1.0 + wanted.mass_error)
-            for name in ("coupler_mass", "rocker_mass", "slider_mass", "coupler_inertia", "rocker_inertia")
-        }
-        if wanted.coulomb_friction is not None:
-            other["slider_coulomb_friction"] = wanted.coulomb_friction
         controller = TrackingController(
-            model,
+            drive.parameters,
             drive.slider,
             wanted.period,
             design=self.design(drive),
@@ -296,7 +299,7 @@ class SliderCase:
             controller,
             crank_speed=drive.crank_speed,
             revolutions=wanted.revolutions,
-            plant=replace(model, **other),
+            plant=replace(drive.parameters, **wanted.plant_values(drive.parameters)),
             load=drive.load,
         )
 
@@ -313,16 +316,20 @@ class SliderCase:
     def system(self, drive: SliderDrive, case: str) -> dict[str, Any]:
         """Return the tables that describe a system of linkage, reference and controller.
 
-        ``case`` is the case file of the linkage.
+        ``case`` is the case file of the model; the linkage of the system differs from it as `tracking` says.
         """
         from ..export.controllers import HARMONICS
 
         wanted, design = self.tracking or TrackingTable(), self.design(drive)
+        known = drive
+        if not wanted.load_known:
+            known = inverse_dynamics(drive.parameters, drive.slider, drive.crank_speed, samples=len(drive.time))
+        plant = {fmi_name(name): value for name, value in wanted.plant_values(drive.parameters).items()}
         period = with_unit(wanted.period, "s")
         # the controller uses the reference one sample later
         reference: dict[str, Any] = {"sample_time": period, "lead": period}
         # samples at equal angles over a turn, from 0, where the crank starts
-        for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", drive.force)):
+        for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", known.force)):
             forwards = samples if drive.crank_speed > 0.0 else np.roll(samples[::-1], 1)
             series = FourierSeries.from_samples(forwards, HARMONICS)
             reference[f"{name}_0"] = with_unit(series.cos[0], unit)
@@ -342,7 +349,7 @@ class SliderCase:
         return {
             "title": f"{self.synthesis.title}: controller and five-bar slider",
             "parts": {
-                "linkage": {"case": case},
+                "linkage": {"case": case, **({"values": plant} if plant else {})},
                 "reference": {"controller": "motion-reference", "values": reference},
                 "controller": {"controller": "pid", "values": controller},
             },

@@ -26,6 +26,7 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
+from analysis.systems import load_system
 from linkwork.errors import InputError
 from tests.linkages import BASE
 
@@ -196,6 +197,25 @@ def test_tracking_without_feed_forward_is_worse(tmp_path) -> None:
     assert feedback > 20.0 * both
     assert forward < 1e-5
     assert 2.0 * both < wrong < 2e-4
+
+
+def test_the_written_system_has_the_plant_and_the_load_of_the_tracking(linkwork, tmp_path) -> None:
+    load = {"fx": "2 N", "fy": "-3 N"}
+    tracking = {"coulomb_friction": "5 N", "mass_error": 0.1, "load_known": False}
+    base = tables(drive={"speed": "120 rpm"}, load=load, make={"slider_damping": "20 N*s/m", "slider_mass": "2 kg"})
+    systems = {}
+    for name, case in (("same", base), ("other", base | {"tracking": tracking}), ("unloaded", base | {"load": {}})):
+        result = linkwork(case, "--no-plots", "--out", name)
+        assert result.exit_code == 0, result.output
+        systems[name] = load_system(tmp_path / name / "system.toml").members
+    same, other = (systems[name]["linkage"].values for name in ("same", "other"))
+    heavier = ("slider.mass", "coupler.mass", "rocker.mass", "coupler.inertia", "rocker.inertia")
+    expected = dict(same) | {name: 1.1 * same[name] for name in heavier} | {"slider.coulomb_friction": 5.0}
+    assert other == pytest.approx(expected, rel=1e-14)
+    assert same["slider.mass"] == 2.0
+    # the force that the feed-forward gives is that of the model without the load
+    assert systems["other"]["reference"].values == pytest.approx(systems["unloaded"]["reference"].values, abs=1e-9)
+    assert abs(systems["same"]["reference"].values["load_0"] - systems["other"]["reference"].values["load_0"]) > 0.1
 
 
 def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
