@@ -11,7 +11,7 @@ import click
 import numpy as np
 from rich.table import Table
 
-from linkwork.errors import Interrupted
+from linkwork.errors import InputError, Interrupted
 
 from . import common
 from .design import leave_if_stopped, read_overrides, search_options, write_description_files, write_linkages
@@ -61,6 +61,10 @@ def slider_motion(
     )
     common.check_kind(case, common.SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
+    if chosen.strategy is not None:
+        for option, value, entry in (("--harmonics", harmonics, "harmonics"), ("--objective", objective, "criterion")):
+            if value is not None:
+                raise InputError(f"{option} is not for a case with [strategy]: use --set strategy.{entry}={value!r}")
     solution, stopped = _find_motion(chosen) if chosen.strategy is None else _find_strategy(chosen)
     folder = common.output_folder(out)
     written = _write_solution(solution, folder, chosen, plot)

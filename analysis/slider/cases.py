@@ -169,11 +169,22 @@ class SliderCase:
 
     def __post_init__(self) -> None:
         syn.check_task("four-bar", self.synthesis.task)
+        if self.synthesis.search.kinds not in (None, ("four-bar",)):
+            raise ParameterError(
+                "search.kinds", self.synthesis.search.kinds, "be four-bar, whose pivot is moved, or left out"
+            )
         if self.linkage is not None and not self.free and self.synthesis.bounds:
             first, limits = next(iter(self.synthesis.bounds.items()))
             raise ParameterError(
                 f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
             )
+        # a search of the simplest mechanism has its own numbers of harmonics and starts
+        given = asdict(self.slider).items() - asdict(SliderTable()).items() if self.strategy is not None else ()
+        for name, value in sorted(given):
+            if name not in ("stroke", "links"):
+                raise ParameterError(
+                    f"slider.{name}", value, "not come with [strategy], which takes slider.stroke alone"
+                )
         if self.drive is None and any((self.load, self.tracking)):
             raise MissingParameterError("drive.speed")
 

@@ -336,6 +336,13 @@ def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -
     assert float(row.split("│")[4]) < 20.1
 
 
+@pytest.mark.parametrize("option", [("--harmonics", 2), ("--objective", "worst")])
+def test_options_of_a_motion_are_not_for_the_strategy(linkwork, option) -> None:
+    result = linkwork(tables(strategy={"tolerance": "1 mm"}, slider={}), *option)
+    assert result.exit_code == cli.WRONG
+    assert "--set strategy." in result.output
+
+
 def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
     done = []
 
@@ -363,7 +370,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
 
     monkeypatch.setattr("analysis.slider.cases.simplest_mechanism", stopped)
     strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
-    result = linkwork(tables(strategy=strategy), "--no-plots")
+    result = linkwork(tables(strategy=strategy, slider={}), "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
     assert "stopped after 1 mechanisms; the best so far is kept" in result.output
     assert (tmp_path / "out" / "report.txt").exists()
@@ -401,6 +408,9 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"strategy": {"tolerance": "1 mm^2"}}, "strategy.tolerance"),
         ({"strategy": {"tolerance": "1 mm", "criterion": "mean"}}, "strategy.criterion"),
         ({"strategy": {"tolerance": "1 mm", "ratios": [1.5]}}, "strategy.ratios"),
+        ({"strategy": {"tolerance": "1 mm"}}, "slider.harmonics is (1,): it must not come with [strategy]"),
+        ({"search": {"kinds": ["slider-crank"]}}, "search.kinds"),
+        ({"search": {"gears": [2]}}, "gears"),
         ({"task": {"kind": "timed-path", "points": [[0, 0]]}}, "points"),
         ({"task": {"kind": "slider-function", "position": [0.2, 0.1, 0.2]}}, "SliderFunction needs a slider at C"),
         ({"task": {"kind": "quick-return", "stroke": "10 cm", "time_ratio": 1.3}}, "it is for a slider-crank"),

@@ -335,6 +335,10 @@ class TestSearch:
         )
 
 
+#: A path that a slider-crank traces.
+WAY = syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3)
+
+
 @pytest.mark.parametrize(
     ("task", "more", "message"),
     [
@@ -358,6 +362,18 @@ class TestSearch:
         (None, {"kinds": ("six-bar",)}, "six-bar"),
         (None, {"kinds": "slider-crank"}, "must be a sequence"),
         (None, {"kinds": ("geared-five-bar",), "gears": (1.234,)}, "be a ratio of whole numbers"),
+        (None, {"gears": (2.0,)}, "gears has no effect"),
+        (None, {"bounds": {"second_crank_length": (0.1, 0.2)}}, "second_crank_length has no effect"),
+        (None, {"kinds": ("slider-crank",), "bounds": {"rocker_length": (0.1, 0.2)}}, "rocker_length has no effect"),
+        (syn.QuickReturn(stroke=0.1), {"pivot": syn.SliderUnknown(harmonics=1)}, "pivot has no effect"),
+        (syn.QuickSwing(swing=1.0), {"pivot": syn.SliderUnknown(harmonics=1)}, "pivot has no effect"),
+        (syn.QuickReturn(stroke=0.1), {"gears": (2.0,)}, "gears has no effect"),
+        (syn.QuickReturn(stroke=0.1), {"weights": [1.0, 1.0, 1.0]}, "no weights"),
+        (syn.QuickReturn(stroke=0.1), {"guesses": [syn.Solution.from_linkage(WAY, SLIDER)]}, "guesses has no effect"),
+        (syn.QuickReturn(stroke=0.1), {"constraints": syn.LargestLink(length=1.0)}, "must be a sequence"),
+        (syn.SliderFunction(position=[0.0, 0.1, 0.2]), {"constraints": syn.FullTurn()}, "must be a sequence"),
+        (None, {"pivot": "slider"}, "pivot is 'slider'"),
+        (None, {"guesses": ["best"]}, "guess 0 is 'best'"),
     ],
 )
 def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], message: str) -> None:
@@ -366,8 +382,13 @@ def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], messa
         syn.synthesize(task or syn.TimedPath(points=points), search=QUICK, **more)
 
 
+def test_what_is_exact_has_no_error_to_trade() -> None:
+    with pytest.raises(InputError, match="over has no effect"):
+        syn.trade_off(syn.QuickReturn(stroke=0.1), "size", [0.2, 0.3])
+
+
 class TestWhatIsMadeOfIt:
-    SOLUTION = syn.Solution.from_linkage(syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3), SLIDER)
+    SOLUTION = syn.Solution.from_linkage(WAY, SLIDER)
 
     def test_report_names_offset_stroke_and_time_ratio(self) -> None:
         text = report(self.SOLUTION)
@@ -484,8 +505,8 @@ class TestGearedFiveBar:
         assert np.ptp(path[:, 1]) > 0.05
         task = syn.TimedPath(points=linkage.path(syn.turn(18)))
         found, alone = (
-            syn.synthesize(task, kinds=(kind,), gears=(-1,), search=QUICK).best
-            for kind in ("geared-five-bar", "four-bar")
+            syn.synthesize(task, search=QUICK, **kind).best
+            for kind in ({"kinds": ("geared-five-bar",), "gears": (-1,)}, {"kinds": ("four-bar",)})
         )
         assert 10.0 * found.error < alone.error
 

@@ -20,7 +20,7 @@ from ..exact.quick_return import QuickReturn, QuickSwing
 from ..linkage import ANGLES, PINS, Kind, MachineSpec, PinForces, pin_forces
 from ..result.solution import Solution
 from ..search.polish import worst_violation
-from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
+from ..search.solve import OVER, Synthesis, TradeOff, check_arguments, synthesize, trade_off
 from ..search.start import Search
 from ..task import constraint
 from ..task.formula import requirement
@@ -140,13 +140,24 @@ class Constraints:
     no_toggle: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
     max_pin_force: float | None = files.entry(files.Quantity("N", above=0.0), None)
     least_pin_force_within: Any = files.entry(_error, None)
-    pins: str = files.entry(files.text, PINS)
+    pins: str | None = files.entry(files.text, None)
     require: tuple[constraint.Constraint, ...] = files.entry(files.Many(requirement), ())
+
+    def __post_init__(self) -> None:
+        for name, carriers in (
+            ("over", ("least_transmission_angle",)),
+            ("pins", ("max_pin_force", "least_pin_force_within")),
+            ("mechanical_advantage_at", ("least_mechanical_advantage", "greatest_mechanical_advantage")),
+        ):
+            value = getattr(self, name)
+            if value is not None and all(getattr(self, carrier) is None for carrier in carriers):
+                raise ParameterError(f"constraints.{name}", value, f"come with {' or '.join(carriers)}")
 
     def constraints(self) -> tuple[constraint.Constraint | constraint.Stroke, ...]:
         """Return the constraints; if the crank cannot turn fully, the transmission angle is bounded only over the task."""
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
+        pins = PINS if self.pins is None else self.pins
         made: tuple[tuple[Any, Callable[[Any], constraint.Constraint | constraint.Stroke]], ...] = (
             (self.least_transmission_angle, lambda angle: constraint.LeastTransmission(angle=angle, over=over)),
             (self.full_turn or None, lambda _: constraint.FullTurn()),
@@ -163,8 +174,8 @@ class Constraints:
             (self.toggle_stretched, lambda rotation: Toggle(at=rotation)),
             (self.toggle_folded, lambda rotation: Toggle(at=rotation, position="folded")),
             (self.no_toggle, lambda ends: NoToggle(between=ends)),
-            (self.max_pin_force, lambda force: constraint.MaxPinForce(force=force, pins=self.pins)),
-            (self.least_pin_force_within, lambda error: constraint.LeastPinForce(error=error, pins=self.pins)),
+            (self.max_pin_force, lambda force: constraint.MaxPinForce(force=force, pins=pins)),
+            (self.least_pin_force_within, lambda error: constraint.LeastPinForce(error=error, pins=pins)),
         )
         return (*(make(value) for value, make in made if value is not None), *self.require)
 
@@ -172,12 +183,6 @@ class Constraints:
         """Return the arguments of `MechanicalAdvantage`; None if the table gives no bounds of the mechanical advantage."""
         ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
         given = {name: end for name, end in ends.items() if end is not None}
-        if self.mechanical_advantage_at is not None and not given:
-            raise ParameterError(
-                "constraints.mechanical_advantage_at",
-                self.mechanical_advantage_at,
-                "come with least_mechanical_advantage or greatest_mechanical_advantage",
-            )
         return {**given, "at": self.mechanical_advantage_at} if given else None
 
 
@@ -232,7 +237,9 @@ class SynthesisCase:
     def __post_init__(self) -> None:
         made = (replace(c, make=self.make) if isinstance(c, constraint.FORCES) else c for c in self.constraints)
         object.__setattr__(self, "constraints", tuple(made))
-        # contradictions are reported before anything is searched
+        # what has no effect, and contradictions, are reported before anything is searched
+        over = self.trade_off and self.trade_off.over
+        check_arguments(self.task, self.search.kinds, bounds=self.bounds, gears=self.search.gears, over=over)
         if not isinstance(self.task, QuickReturn | QuickSwing):
             limits_by_kind(
                 self.task, normal_form(self.task), self.bounds, self.constraints, self.search.kinds, self.search.gears

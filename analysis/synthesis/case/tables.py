@@ -266,6 +266,8 @@ class _Curve(_ObjectiveAndRange):
 
         ``given`` are crank rotations, as `Steps` or a list, and a list of angles; each may be None.
         """
+        if self.points is not None:
+            _refuse_entries(self, ("closed",), "file or task.x, in tasks with crank rotations")
         points, closed = self._target_points(folder)
         n = len(points) + 1
         counted = any(isinstance(one, Steps) or (one is not None and len(one) == n) for one in given)
@@ -341,7 +343,9 @@ class PrecisionPointsTable(_Curve):
     def _body(self, folder: Path) -> dict[str, Any]:
         """Return the arguments that `PrecisionPoints` and `Motion` share; the entry ``turn`` rotates both points and body."""
         angle = None
-        if self.angle is not None:
+        if self.angle is None:
+            _refuse_entries(self, ("angle_unit", "length"), "angle")
+        else:
             angles = Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle")
             angle = np.array(angles) + (self.turn or 0.0)
         points = self._timed_points(folder, self.rotation, angle)
@@ -389,18 +393,20 @@ class RockerFunctionTable(_ObjectiveAndRange):
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(any_value, None)
     mounting: bool = entry(flag, False)
-    spacing: Any = entry(Choice(("even", "chebyshev")), "even")
+    spacing: Any = entry(Choice(("even", "chebyshev")), None)
 
     def task(self, folder: Path) -> Task:
         written = isinstance(self.angle, str)
         if _only_source(self, ("angle", "file")) == "file" or written:
             _refuse_entries(self, ("rotation",), "angle as a list")
         if not written:
-            _refuse_entries(self, ("n", "start", "end"), "angle as a formula")
+            _refuse_entries(self, ("n", "start", "end", "spacing"), "angle as a formula")
         unit = self.angle_unit or "rad"
         rotation: FloatArray | None
         if written:
-            rotation, angle = function_from_formula(self.angle, unit=unit, spacing=self.spacing, **self._range())
+            rotation, angle = function_from_formula(
+                self.angle, unit=unit, spacing=self.spacing or "even", **self._range()
+            )
         elif self.file is not None:
             rotation, angle = read_points(folder / self.file, unit=self.angle_unit, si="rad")[0].T
         else:

@@ -30,7 +30,7 @@ from ..linkage.linkage import LINKS, Linkage, SliderCrank
 from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
 from ..task.limit_position import dead_centres
-from ..task.limits import GROUND, LARGEST, check_bounds, check_greatest_length, complete_bounds
+from ..task.limits import GROUND, LARGEST, check_bounds, check_greatest_length, check_sequence, complete_bounds
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
@@ -126,6 +126,7 @@ def quick_returns(
     Raises InputError or ParameterError if a bound or a constraint is not supported here; InfeasibleError if there is no
     linkage, or no linkage has the required transmission angle: the message names the greatest possible angle.
     """
+    check_sequence(constraints)
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
             other = "SliderFunction" if isinstance(task, QuickReturn) else "RockerFunction"

@@ -23,6 +23,7 @@ from ..linkage.pivot import Kind, PivotUnknown
 from ..result.report import solution_columns
 from ..result.solution import Solution, group_similar, rank_solutions
 from ..task.constraint import (
+    SECOND_LENGTH,
     USUAL,
     Constraint,
     Demand,
@@ -32,7 +33,16 @@ from ..task.constraint import (
     MaxPinForce,
     Stroke,
 )
-from ..task.limits import GEARS, Limits, check_task, limits_by_kind, make_limits, place_as_task, usual_kinds
+from ..task.limits import (
+    GEARS,
+    Limits,
+    check_bounds,
+    check_task,
+    limits_by_kind,
+    make_limits,
+    place_as_task,
+    usual_kinds,
+)
 from ..task.task import Normal, Task, UntimedPath, normal_form, replace_weights
 from .polish import EXACT, Polished, distinct_answers, feasible_answers, infeasible_error, polish
 from .scan import scan
@@ -147,9 +157,9 @@ def synthesize(
     task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
     bounds : mapping, optional
         (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
-        ``second_crank_length``. Equal bounds fix a dimension. Kinds of linkages without the dimension ignore its bounds. By
-        default links are at most five times the target's size; for a rocker function the ground link is 0.1 m and the other
-        links are at most 0.5 m.
+        ``second_crank_length``. Equal bounds fix a dimension. Of several kinds of linkages, those without the dimension ignore
+        its bounds. By default links are at most five times the target's size; for a rocker function the ground link is 0.1 m
+        and the other links are at most 0.5 m.
     constraints : sequence
         See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
@@ -169,11 +179,15 @@ def synthesize(
     Raises
     ------
     InputError
-        If an argument is not usable, or a kind of linkage cannot do the task or meet a constraint.
+        If an argument is not usable or has no effect, or a kind of linkage cannot do the task or meet a constraint.
     InfeasibleError
         If no linkage meets all bounds and constraints; the message names the constraint that the nearest linkage violates most.
     SynthesisInterrupted
         On Ctrl-C, with the best solutions so far.
+
+    Notes
+    -----
+    A `QuickReturn` and a `QuickSwing` are solved in closed form: of the settings of the search only ``solutions`` counts.
 
     Examples
     --------
@@ -191,6 +205,7 @@ def synthesize(
     begun = perf_counter()
     task = replace_weights(task, weights)
     kinds = usual_kinds(task) if kinds is None else kinds
+    check_arguments(task, kinds, bounds=bounds, pivot=pivot, guesses=guesses, gears=gears)
     if isinstance(task, QuickReturn | QuickSwing):
         return _solve_in_closed_form(task, bounds, constraints, kinds, search, begun)
     task = _prepare_task(task, constraints, pivot)
@@ -229,6 +244,48 @@ def synthesize(
         raise refused
     together = found[0] if len(found) == 1 else _merge_kinds(found, search.solutions)
     return _make_result(task, together, done, total, search, begun)
+
+
+def check_arguments(
+    task: Task,
+    kinds: Sequence[Kind] | None,
+    *,
+    bounds: Mapping[str, Any] | None = None,
+    pivot: PivotUnknown | None = None,
+    guesses: Sequence[Solution] = (),
+    gears: Sequence[float] = GEARS,
+    over: str | None = None,
+) -> None:
+    """Check arguments of `synthesize` and `trade_off`.
+
+    Raises InputError if a pivot or a guess is of another type, or if an argument has no effect on the task with these kinds.
+    """
+    kinds, named = usual_kinds(task) if kinds is None else kinds, check_bounds(bounds)
+    if not isinstance(pivot, PivotUnknown | None):
+        raise InputError(f"pivot is {pivot!r}: it must be a SliderUnknown or a CrankUnknown")
+    for number, guess in enumerate(guesses):
+        if not isinstance(guess, Solution):
+            raise InputError(f"guess {number} is {guess!r}: it must be a Solution, such as the best of a Synthesis")
+    alone, geared = f"but kinds are {' and '.join(map(str, kinds))} alone", "geared-five-bar" in kinds
+    unused = {
+        "gears": "it is for a geared-five-bar, " + alone if tuple(gears) != GEARS and not geared else "",
+        SECOND_LENGTH: "it is a dimension of a geared-five-bar, " + alone
+        if SECOND_LENGTH in named and not geared
+        else "",
+        "rocker_length": "a slider-crank has no rocker, " + alone
+        if "rocker_length" in named and tuple(kinds) == ("slider-crank",)
+        else "",
+    }
+    if isinstance(task, QuickReturn | QuickSwing):
+        closed = f"a {type(task).__name__} is solved in closed form, with "
+        unused |= {
+            "pivot": closed + "a fixed pivot" if pivot is not None else "",
+            "guesses": closed + "no search that starts from guesses" if len(guesses) else "",
+            "over": closed + "no error to trade" if over is not None else "",
+        }
+    for name, reason in unused.items():
+        if reason:
+            raise InputError(f"{name} has no effect: {reason}; leave it out")
 
 
 def _solve_in_closed_form(
@@ -520,6 +577,7 @@ def trade_off(
     """
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
+    check_arguments(task, kinds, bounds=bounds, pivot=pivot, gears=gears, over=over)
     values = np.array(limits, dtype=float)
     kind = {"size": LargestLink, "transmission": LeastTransmission, "pin-force": MaxPinForce}[over]
     running = next((c for c in constraints if isinstance(c, MaxPinForce)), MaxPinForce(force=1.0))

@@ -144,8 +144,7 @@ def make_limits(
     the wrong order, or bounds and constraints contradict one another.
     """
     bounds = check_bounds(bounds)
-    if not isinstance(constraints, Sequence):
-        raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
+    check_sequence(constraints)
     # kinds of linkages without a second crank leave it out
     bounds = {name: ends for name, ends in bounds.items() if name != SECOND_LENGTH}
     for name in bounds:
@@ -283,6 +282,12 @@ def check_bounds(bounds: Mapping[str, tuple[float, float]] | None) -> Mapping[st
     return bounds or {}
 
 
+def check_sequence(constraints: Sequence[Any]) -> None:
+    """Raise InputError if constraints are no sequence."""
+    if not isinstance(constraints, Sequence):
+        raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
+
+
 def check_greatest_length(name: str, high: float) -> None:
     """Raise ParameterError if the greatest length of a link is not above zero."""
     if high <= 0.0:
@@ -390,6 +395,7 @@ def limits_by_kind(
     InfeasibleError as `make_limits` does.
     """
     kinds, bounds = usual_kinds(task) if kinds is None else kinds, check_bounds(bounds)
+    check_sequence(constraints)
     if isinstance(kinds, str) or not kinds:
         raise InputError(
             f"kinds are {kinds!r}: they must be a sequence of one or several of {', '.join(get_args(Kind))}"
@@ -399,8 +405,7 @@ def limits_by_kind(
         if kind not in get_args(Kind):
             raise unknown_name(kind, get_args(Kind), f"kind {kind!r}")
         check_task(kind, task)
-        if isinstance(constraints, Sequence):
-            _check_constraints(kind, constraints)
+        _check_constraints(kind, constraints)
         if kind == "four-bar":
             own: Sequence[Any] = constraints
             found.append(make_limits(task, normal, bounds, own))

@@ -369,6 +369,10 @@ class PrecisionPoints:
             _set_fields(self, rotation=_rotation(self.rotation, len(points)))
         if angle is None:
             _check_extent(points, "precision points")
+            if self.length is not None:
+                raise InputError(
+                    f"length is {self.length}: points without angles have no errors of angle; leave it out"
+                )
         else:
             _set_fields(self, angle=angle, length=_leverage(self.length, points))
 
