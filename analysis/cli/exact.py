@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 import click
+import numpy as np
 
 from linkwork.errors import InputError
 
@@ -20,11 +21,11 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
 @click.option(
     "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
-@click.option("--count", type=click.IntRange(1), default=6, help="Number of linkages to report for four poses.")
+@click.option("--count", type=click.IntRange(1), help="Number of linkages to report for four poses, 6 by default.")
 @common.plot_option
 @common.out_option(help="Folder for the results.")
 @common.report_errors
-def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plot: bool, out: str) -> None:
+def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int | None, plot: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
     For five poses of a body there are up to six four-bars; for four poses there is a curve of dyads (Burmester). For three to
@@ -42,6 +43,10 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         Generators,
         Guidance,
         GuidanceMap,
+        Motion,
+        PrecisionPoints,
+        QuickReturn,
+        QuickSwing,
         RockerFunction,
         assess,
         function_generators,
@@ -54,12 +59,18 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     common.check_kind(case, common.SYNTHESIS)
     chosen = load_synthesis_case(case, read_overrides(settings))
     found: Generators | Guidance | GuidanceMap
-    if isinstance(chosen.task, RockerFunction):
-        found = function_generators(chosen.task, crank_phase=crank_phase)
+    task = chosen.task
+    if isinstance(task, QuickReturn | QuickSwing) or not isinstance(task, RockerFunction | PrecisionPoints | Motion):
+        which = f"{case} asks for a {type(task).__name__}, not for points of a rocker function or poses of a body"
+        raise InputError(f"{which}: linkwork synthesize {case}")
+    if count is not None and (isinstance(task, RockerFunction) or len(np.asarray(task.points)) != 4):
+        raise InputError("--count is for four poses of a body: all other linkages are reported")
+    if isinstance(task, RockerFunction):
+        found = function_generators(task, crank_phase=crank_phase)
     elif crank_phase is not None:
         raise InputError("--crank-phase is for a function of the rocker: poses leave the crank's angle free")
     else:
-        found = guidance(chosen.task, count)
+        found = guidance(task, count or 6)
     common.console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
     folder = common.output_folder(out)
     written = []

@@ -517,6 +517,25 @@ def test_command_of_a_function(linkwork: Callable[..., Result]) -> None:
     result = linkwork(EXAMPLES / "five-poses.toml", "--crank-phase", "10 deg")
     assert result.exit_code == cli.WRONG
     assert "poses leave the crank's angle free" in result.output
+    for example in ("five-poses.toml", "sine-function.toml"):
+        result = linkwork(EXAMPLES / example, "--count", 3)
+        assert result.exit_code == cli.WRONG
+        assert "--count is for four poses" in result.output
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        'kind = "quick-return"\nstroke = "8 cm"',
+        'kind = "quick-return"\nswing = "40 deg"',
+        'kind = "timed-path"\npoints = [[0, 0], [1, 0], [1, 1]]',
+    ],
+)
+def test_the_command_names_the_one_for_other_tasks(linkwork: Callable[..., Result], tmp_path: Path, task: str) -> None:
+    (tmp_path / "case.toml").write_text(f"[task]\n{task}\n")
+    result = linkwork("case.toml")
+    assert result.exit_code == cli.WRONG
+    assert "linkwork synthesize case.toml" in result.output
 
 
 def test_pictures_show_every_dyad_and_linkage() -> None:
