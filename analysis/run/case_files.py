@@ -382,7 +382,7 @@ def _reader(unit: str, folder: Path) -> Reader:
         except (ValueError, ArithmeticError) as error:  # such as of a spline through numbers near 1e308
             raise InputError(f"{name} cannot be made a signal: {files.first_line(error)}") from error
 
-    return Many(signal, single=True) if unit == "N.m" else signal
+    return Many(signal, least=1, single=True) if unit == "N.m" else signal
 
 
 def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:

@@ -216,9 +216,11 @@ def _check_channel(name: str, value: Any) -> None:
     on_shafts = {m.channels[n].argument for m in MECHANISMS.values() for n in m.torques}
     parts = _parts(value)
     kinds = _SIGNALS if name in on_shafts else _SIGNALS[:-2]
+    if isinstance(value, tuple) and not value:
+        raise InputError(f"{name} is (): a sum has at least one summand; leave {name} out if nothing acts")
     for part in parts:
-        if not isinstance(part, kinds):
-            also = "; a motor can only drive a freedom that turns" if isinstance(part, _SIGNALS) else ""
+        if not isinstance(part, kinds) or isinstance(part, bool):
+            also = "; a motor can only drive a freedom that turns" if isinstance(part, _SIGNALS[-2:]) else ""
             raise InputError(
                 f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function{also}"
             )

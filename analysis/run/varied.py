@@ -75,6 +75,8 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
         If a name is unknown, lengths differ, or a value is wrong; the message names the set.
     """
     mechanism = find_mechanism(parameters)
+    if not isinstance(values, Mapping):
+        raise InputError(f"vary is {values!r:.200}: it must be a mapping from names to values, one value for each set")
     own = {field.name for field in fields(mechanism.parameters)}
     channels = {name: c.argument for c in mechanism.channels if c.kind != "rate" for name in (c.name, c.argument)}
     if not isinstance(inputs, Inputs | None):

@@ -232,6 +232,7 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
         ),
         ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
         ('published = "table-3.1"\ntitle = nan', "title is nan"),
+        ('published = "table-3.1"\n[drive]\ntorque = []', r"drive\.torque is \[\]: it must have at least 1 entry"),
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),

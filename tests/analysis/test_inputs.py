@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from analysis import simulate
+from analysis import simulate, simulate_many
 from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
@@ -237,6 +237,10 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: Inputs(force=nan), "force is nan"),
         (lambda: Inputs(torque=(1.0, inf)), "torque is inf"),
         (lambda: Inputs(load_x="much"), "load_x is 'much'"),
+        (lambda: Inputs(torque=()), "a sum has at least one summand"),
+        (lambda: Inputs(torque=[]), r"torque is \[\]"),
+        (lambda: Inputs(torque=True), "torque is True: it must be a number"),
+        (lambda: simulate_many("table-3.1", vary=(), stop_time=1.0), r"vary is \(\): it must be a mapping"),
         (lambda: Inputs(force=TorsionBar(torque=1.0)), "force is TorsionBar"),
         (lambda: Inputs(torque=(TorsionBar(torque=1.0), TorsionBar(torque=2.0))), "more than one TorsionBar"),
         (lambda: Inputs(force=(Function(force), Function(force))), "force has more than one Function"),
