@@ -124,7 +124,7 @@ class TrackingTable:
     mass_error: float = files.entry(files.Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
     load_known: bool = files.entry(files.flag, True)
 
-    def plant_values(self, model: FiveBarParameters) -> dict[str, float]:
+    def plant_values(self, model: FiveBarParameters) -> dict[str, Any]:
         """Return the parameters in which the plant differs from the model, by field name."""
         heavier = ("coupler_mass", "rocker_mass", "slider_mass", "coupler_inertia", "rocker_inertia")
         values = {name: getattr(model, name) * (1.0 + self.mass_error) for name in heavier if self.mass_error}

@@ -238,7 +238,7 @@ class SynthesisCase:
         made = (replace(c, make=self.make) if isinstance(c, constraint.FORCES) else c for c in self.constraints)
         object.__setattr__(self, "constraints", tuple(made))
         # what has no effect, and contradictions, are reported before anything is searched
-        over = self.trade_off and self.trade_off.over
+        over = None if self.trade_off is None else self.trade_off.over
         check_arguments(self.task, self.search.kinds, bounds=self.bounds, gears=self.search.gears, over=over)
         if not isinstance(self.task, QuickReturn | QuickSwing):
             limits_by_kind(

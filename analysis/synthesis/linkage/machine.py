@@ -217,6 +217,8 @@ FloatArray = NDArray[np.float64]
 PINS = "ABCD"
 #: Number of steps at which a run of the plant is sampled.
 SAMPLES = 720
+#: Greatest number of runs until a slider has settled.
+SETTLING = 5
 #: Mass of the slider that represents a fixed pivot in a run, relative to the mass of the links.
 HEAVY = 1e8
 
@@ -392,6 +394,28 @@ def _evaluate_forces(linkage: Linkage, make: MachineSpec, rotation: FloatArray) 
         at = float(rotation[np.argmin(np.isfinite(force).all(axis=1))])
         raise AssemblyError(f"the links cannot be joined at a crank rotation of {at:.6g} rad")
     return PinForces(rotation=rotation, force=force, moved=0.0)
+
+
+def settle_slider(
+    parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
+) -> tuple[float, float]:
+    """Return position (m) and velocity (m/s) of a slider that a run of ``duration`` (s) returns to; zeros if it has none.
+
+    With a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
+    is repeated at most `SETTLING` times until the slider is within a millionth of its travel. SciPy's method is used: to
+    compile the solver would take longer.
+    """
+    slider = 0.0, 0.0
+    for _ in range(SETTLING):
+        start = InitialState(crank_angle=crank_angle, slider_position=slider[0], slider_velocity=slider[1])
+        run = simulate(parameters, acting, initial=start, stop_time=duration, step=duration / 64.0, method="LSODA")
+        if run.status:
+            break
+        before, slider = slider, (float(run["slider.position"][-1]), float(run["slider.velocity"][-1]))
+        swept = max(np.abs(run["slider.position"]).max(), np.abs(run["slider.velocity"]).max() * duration / (2.0 * pi))
+        if max(abs(slider[0] - before[0]), abs(slider[1] - before[1]) * duration / (2.0 * pi)) <= 1e-6 * swept:
+            return slider
+    return 0.0, 0.0
 
 
 # The linkage as tables of a case file, from which it can be simulated, exported as an FMU and shown in the studio

@@ -16,11 +16,11 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...display import NotebookResult, format_count
 from ...files import write_csv
-from ...run import parameter_tables
+from ...run import Inputs, parameter_tables
 from ...units import with_unit
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import LINKS, Linkage, SliderCrank, wrap_angles
-from ..linkage.machine import MachineSpec, description, drives, loads
+from ..linkage.machine import MachineSpec, description, drives, loads, settle_slider
 from ..linkage.pivot import SecondCrank, gear_turns
 from ..task.target import area_difference, curve_distance, half_lengths, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
@@ -397,6 +397,7 @@ class Solution(NotebookResult):
         """Return the tables of a case file that runs the linkage through its task at constant speed.
 
         A slider-crank runs as the slider-crank mechanism, any other linkage as the five-bar slider; see `docs/case-files.md`.
+        The five-bar's slider starts in its steady motion or, if the crank does not turn fully, in equilibrium.
         """
         linkage, at = self.linkage, self.evaluation.rotation
         start = (0.0 if at is None else float(at[0])) + linkage.crank_phase
@@ -409,11 +410,17 @@ class Solution(NotebookResult):
         if isinstance(linkage, SliderCrank):
             # at the slider alone, which the plant loads along its guide
             load = with_unit(along if linkage.point_is_pin else 0.0, "N")
+        speed, plant, angle = self.direction * make.speed, make.plant(linkage), remainder(start, tau)
+        initial = {"crank_angle": with_unit(angle, "rad")}
+        if isinstance(plant, FiveBarParameters):
+            turning = Inputs(speed=speed if "revolutions" in run else 0.0, load_x=across, load_y=along)
+            position, velocity = settle_slider(plant, turning, angle, tau / make.speed)
+            initial |= {"slider_position": with_unit(position, "m"), "slider_velocity": with_unit(velocity, "m/s")}
         return {
             "title": title,
-            **parameter_tables(make.plant(linkage)),
-            "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
-            "drive": {"speed": with_unit(self.direction * make.speed, "rad/s")},
+            **parameter_tables(plant),
+            "initial": initial,
+            "drive": {"speed": with_unit(speed, "rad/s")},
             **({"load": load} if any(make.load) else {}),
             "run": run,
         }
