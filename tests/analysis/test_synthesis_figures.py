@@ -156,6 +156,29 @@ def test_the_block_is_drawn_as_a_rectangle_along_its_guide() -> None:
     assert block.points.mean(axis=0) == pytest.approx(tilted.pins(1.0)["D"])
 
 
+@pytest.mark.parametrize(("distance", "angle"), [(1.0, 0.0), (0.4, 0.0), (1.7, 0.0), (0.5, pi), (0.0, 0.0), (0.5, 0.7)])
+@pytest.mark.parametrize("kind", ["four-bar", "slider-crank"])
+def test_no_part_of_the_coupler_is_drawn_twice(kind: str, distance: float, angle: float) -> None:
+    links = {"crank_length": 0.05, "coupler_length": 0.2, "point_distance": 0.2 * distance, "point_angle": angle}
+    if kind == "four-bar":
+        linkage = syn.Linkage(ground_length=0.25, rocker_length=0.2, **links)
+    else:
+        linkage = syn.SliderCrank(ground_length=0.02, **links)
+    solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(12)) + 1e-3), linkage)
+    drawn, pins = syn.drawing(solution, 1.0), linkage.pins(1.0)
+    bare = syn.drawing(solution, 1.0, poses=1)
+    lines = [LineString([line.start, line.end]) for line in drawn.lines if line.layer == "coupler"]
+    outlines = [Polygon(one.points).exterior for one in drawn.polylines if one.layer == "coupler"]
+    there = [LineString(one.points) for one in bare.polylines if one.layer == "poses"]
+    for parts in (lines + outlines, there):
+        # a tenth of a millimetre to each side
+        strips = [part.buffer(1e-4, cap_style="flat") for part in parts]
+        shared = sum(one.intersection(other).area for k, one in enumerate(strips) for other in strips[:k])
+        assert shared < 1e-6
+    assert all(min(part.distance(Point(pins[pin])) for part in lines + outlines) < 1e-12 for pin in "BCP")
+    assert sum(len(one.points) for one in bare.polylines if one.layer == "poses") >= 4
+
+
 def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
     task = syn.Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
     solution = syn.Solution.from_linkage(task, SWINGING)

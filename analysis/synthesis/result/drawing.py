@@ -213,6 +213,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     drawn = [np.array(list(pins.values())), *(q for q in (*scene.curves, scene.target) if q is not None)]
     size = float(np.ptp(np.vstack(drawn), axis=0).max())
     radius, height = PIN * size, LETTER * size
+    along = _coupler_line(pins, 1e-9 * size * size)
     bars = solution.linkage.bars
     lines = [Line(layer=layer, start=pins[ends[0]], end=pins[ends[1]]) for layer, ends in bars]
     held = "ground" if scene.guide is None else "slider"
@@ -232,14 +233,12 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         Polyline(layer="poses", points=np.array([there[name] for name in names]))
         for phi in further
         if (there := scene.pins(float(phi))) is not None
-        for names in (("ABCDE" if scene.second_crank else "ABCD"), *(["BPC"] if "P" in there else []))
+        for names in (("ABCDE" if scene.second_crank else "ABCD"), *([_BESIDE[along]] if _BESIDE[along] else []))
     ]
     if scene.second_crank:
         circles.append(Circle(layer="ground", centre=e, radius=radius))
-    if p is None or abs((c[0] - b[0]) * (p[1] - b[1]) - (c[1] - b[1]) * (p[0] - b[0])) < 1e-9 * size * size:
-        lines.append(Line(layer="coupler", start=b, end=c))
-        if p is not None:
-            lines.append(Line(layer="coupler", start=b, end=p))
+    if along:
+        lines.append(Line(layer="coupler", start=pins[along[0]], end=pins[along[1]]))
     else:
         polylines.append(Polyline(layer="coupler", points=np.array([b, c, p]), closed=True))
     if p is not None:
@@ -269,6 +268,18 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         ),
         texts=tuple(texts),
     )
+
+
+#: What a further position shows of the coupler beside B -> C, by `_coupler_line`.
+_BESIDE = {"": "BPC", "BC": "", "BP": "CP", "PC": "BP"}
+
+
+def _coupler_line(pins: Mapping[str, Point], least: float) -> str:
+    """Return the ends of the line that B, C and the coupler point lie on; empty if they span twice the area ``least`` (m2)."""
+    b, c, p = pins["B"], pins["C"], pins.get("P", pins["C"])
+    if abs((c[0] - b[0]) * (p[1] - b[1]) - (c[1] - b[1]) * (p[0] - b[0])) >= least:
+        return ""
+    return "BC" if "P" not in pins else max(("BC", "BP", "PC"), key=lambda ends: dist(pins[ends[0]], pins[ends[1]]))
 
 
 def _link_dimensions(
