@@ -1,5 +1,7 @@
 """The figures of chapter III: drift, steady motion, launches, free motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -128,6 +130,12 @@ class TestLaunch:
         assert exponent.computed == pytest.approx(published.TORQUE_TIME_EXPONENT, abs=0.005)
         assert np.polyfit(np.log(time), np.log(torque), 1)[0] == pytest.approx(published.TORQUE_TIME_EXPONENT, abs=0.02)
 
+    @pytest.mark.parametrize(
+        ("values", "place"), [([3, 2, 1, 3, 1, 0], 3.75), ([1, 1, 1], 0.0), ([1, 2, 3], 3.0), ([3, 1.5, 1], 1.0)]
+    )
+    def test_last_place_above_a_level(self, values: list[float], place: float) -> None:
+        assert launches.last_crossing(np.array(values, float), 1.5) == pytest.approx(place)
+
     def test_least_torque_to_four_digits(self) -> None:
         least = launches.least_torque()
         assert np.isfinite(launches.release_time(1.0001 * least, stop_time=3.0))
@@ -163,6 +171,12 @@ class TestFreeMotion:
         assert turns.second == pytest.approx([0.1] * 3, rel=1e-6)
         # 0.08 of 3, and 5.2 squared less 4.8 squared of 25.02
         assert turns.energy_share == pytest.approx([(0.08 / 3.0) / (4.0 / 25.02)] * 3, rel=1e-3)
+
+    def test_speed_of_the_greatest_value_between_turns(self) -> None:
+        turns = free_crank.Turns(*[np.array([])] * 9)
+        turns = replace(turns, speed=np.array([50.0, 40.0, 32.0, 26.0]))
+        # a parabola over the turns, greatest 0.7 turns after the first
+        assert turns.speed_of_greatest(2.0 - (np.arange(4.0) - 0.7) ** 2) == pytest.approx(43.0)
 
     @pytest.mark.parametrize("degrees", [0, 60, 200])
     def test_natural_frequency_with_the_crank_held(self, degrees: int) -> None:

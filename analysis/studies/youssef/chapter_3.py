@@ -381,8 +381,8 @@ def _torque_curves() -> list[Statement]:
     away = np.min([np.abs((angle - at + 180.0) % 360.0 - 180.0) for at in places.values()], axis=0)
     # in the last part of the turn the torques only fall
     reversals = [np.interp(0.0, -curve[1320:], angle[1320:]) - 360.0 for curve in torque]
-    changes = np.abs(np.diff(torque, axis=1)).argmax(axis=1)
-    steepest = (0.5 * (angle[changes] + angle[changes + 1]) + 180.0) % 360.0 - 180.0
+    between = 0.5 * (angle[:-1] + angle[1:])
+    steepest = [(greatest(between, np.abs(np.diff(curve)))[0] + 180.0) % 360.0 - 180.0 for curve in torque]
     curves = torque / np.ptp(torque)
     seen = [graph_distance(angle / 360.0, curves[i], curves[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
     extremes = {"greatest": torque.max(axis=1), "least": torque.min(axis=1)}

@@ -23,7 +23,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
 from ..variation import cache
-from .runs import ALIKE_WORDS, SIGN, SPEED, greatest_ratio, plain, table_3_1
+from .runs import ALIKE_WORDS, SIGN, SPEED, greatest, greatest_ratio, plain, table_3_1
 
 #: Springs of the free motion (dyn/cm).
 SOFT, STIFF = 5e5, 2e6
@@ -98,6 +98,11 @@ class Turns:
     def shown(self) -> int:
         """Return the number of turns up to the first whose mean crank speed is below `HARMONIC_SPEED`, this turn included."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
+
+    def speed_of_greatest(self, values: NDArray[np.float64]) -> float:
+        """Return the mean crank speed (rad/s) at which values, one for each turn, are greatest, interpolated between turns."""
+        turns = np.arange(len(values), dtype=float)
+        return float(np.interp(greatest(turns, values)[0], turns, self.speed))
 
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
@@ -414,7 +419,7 @@ def stiff_phase_plane() -> StudyResult:
     # the mean speed falls from turn to turn
     seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
     # the speeds at which the second harmonic is greatest: over the first, and over its force
-    most, resonance = (stiff.speed[(stiff.second / by).argmax()] for by in (stiff.first, stiff.speed**2))
+    most, resonance = (stiff.speed_of_greatest(stiff.second / by) for by in (stiff.first, stiff.speed**2))
     parameters, over_turn = table_3_1(STIFF), half_natural_frequencies(STIFF)
     half, about = 0.5 * natural_frequency(parameters), ABOUT * HARMONIC_SPEED
     # an oscillator with this damping ratio swings most at sqrt(1 - 2 ratio^2) of its natural frequency

@@ -90,6 +90,16 @@ def least_torque() -> float:
     return float(np.sqrt(low * high))
 
 
+def last_crossing(values: NDArray[np.float64], level: float) -> float:
+    """Return the place, between samples, after which the values stay below a level: 0 if they always do."""
+    above = np.flatnonzero(values > level)
+    if not above.size:
+        return 0.0
+    last = int(above[-1])
+    after = values[min(last + 1, len(values) - 1)]
+    return last + float((values[last] - level) / (values[last] - after)) if after < level else float(last + 1)
+
+
 class Settling(NamedTuple):
     """Transition of the slider position u after a launch to the steady decay of a free crank.
 
@@ -122,7 +132,7 @@ def settling(torque: float, stiffness: float) -> Settling:
         wave = np.array([np.interp(-speed, -known.speed, column) for column in waves.T])
         found.append(np.abs(turn - wave) / np.ptp(wave))
     distances = np.array(found)
-    count = float(np.append(0, 1 + np.flatnonzero(distances > ALIKE))[-1]) / SAMPLES
+    count = last_crossing(distances.ravel(), ALIKE) / SAMPLES
     end = float(np.interp(1.0 + 2.0 * pi * count, launched["crank.angle"], launched.time))
     decaying = after.slider[min(ceil(count), len(after.slider) - 2) :]
     return Settling(
