@@ -464,7 +464,7 @@ def _hamming_statements() -> list[Statement]:
                     "convergent",
                     1.0,
                     spurious_root((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
-                    why="Milne's corrector is weakly unstable",
+                    why="Milne's corrector, which the thesis uses, too (L1409-1415), is weakly unstable",
                 ),
                 at_least(
                     "highly stable",
