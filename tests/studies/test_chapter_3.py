@@ -260,6 +260,21 @@ class TestFormulation:
         assert classical == pytest.approx(np.sqrt(8.0), rel=1e-4)
         assert hamming(0.999j * found) < 1.0 < hamming(1.001j * found)
 
+    @pytest.mark.parametrize(("modified", "final", "order"), [(1, 1, 5), (0, 1, 5), (1, 0, 4), (0, 0, 4)])
+    def test_the_final_value_adds_an_order(self, modified: int, final: int, order: int) -> None:
+        """(2.28) to (2.31) on y' = -y from exact values, with the modifier and the final value or without them."""
+        errors = []
+        for h in (0.05, 0.025):
+            y, apart = np.exp(-h * np.arange(4.0)).tolist(), 0.0
+            while len(y) <= round(1.0 / h):
+                p = y[-4] - 4.0 * h / 3.0 * (2.0 * y[-1] - y[-2] + 2.0 * y[-3])
+                m = p - modified * 112.0 / 121.0 * apart
+                c = (9.0 * y[-1] - y[-3] - 3.0 * h * (m + 2.0 * y[-1] - y[-2])) / 8.0
+                apart = p - c
+                y.append(c + final * 9.0 / 121.0 * apart)
+            errors.append(abs(y[-1] - np.exp(-1.0)))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.35)
+
     def test_milne_grows_where_hamming_decays(self) -> None:
         """Milne's corrector by steps on y' = -y from a start that is off by 1e-8."""
         h, y = 0.1, [1.0, np.exp(-0.1) + 1e-8]

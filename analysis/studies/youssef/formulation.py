@@ -489,7 +489,7 @@ def _hamming_statements() -> list[Statement]:
             f"changes from {1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
             "at least the stated order",
             (replace(at_least("", 4.0, order), stated="fourth"),),
-            "the modifier and the final value remove the leading error, which adds one order",
+            "the final value (2.31) removes the leading error of the corrector, which adds one order",
         ),
     ]
 

@@ -182,8 +182,8 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 
 #: How the rise of the crank speed is judged.
 RISE = (
-    "greatest distance of the crank speed, up to its peak while the torque acts, from the best line (its greatest distance "
-    "from the curve is least), relative to the peak. Then the crank angle of this peak, before the torque ends at 1 rad"
+    "greatest distance of the crank speed, up to its peak while the torque acts, from the best line parallel to the "
+    "chord from start to peak, relative to the peak. Then the crank angle of this peak, before the torque ends at 1 rad"
 )
 
 

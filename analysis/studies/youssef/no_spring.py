@@ -189,7 +189,7 @@ def drift_result() -> StudyResult:
                 "and [u0] are constants depending on [mu].",
                 text("3.2.1, L1911-1917"),
                 f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} (our choice), or until the "
-                "links are collinear, from the best line through these points, relative to the drift. Then the relative "
+                "links are collinear, from their least-squares line, relative to the drift. Then the relative "
                 f"decrease in size of M and u0 from {_mu(5e5)} to 1e6",
                 f"{ALIKE_WORDS}; *depending* means by more than that; {FEWEST_TURNS} cycles, two for the transient and two "
                 "for a line",
