@@ -16,7 +16,7 @@ from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
-from .tables import heading_unit
+from .tables import NO_UNIT, heading_unit, units_below
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
@@ -41,8 +41,9 @@ def read_points(
     """Read the points of a curve from a CSV or SVG file.
 
     CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; they may have a header line such
-    as ``x [mm],y [mm]``. Where a semicolon or a tab separates them, numbers may have a decimal comma. Empty lines and lines
-    that start with # are ignored. If the last point repeats the first point, it is omitted and the curve is closed.
+    as ``x [mm],y [mm]``, and a line of units below it. Where a semicolon or a tab separates them, numbers may have a decimal
+    comma. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is omitted and the
+    curve is closed.
 
     SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
     selects an element by its ``id``; if the element is a group, the first path or shape in the group is read. Transforms are
@@ -110,6 +111,7 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
     """Return the columns x and y of a CSV file's text, shape (n, 2), and the units in its header line."""
     rows: list[tuple[float, float]] = []
     header = comment = ""
+    below: tuple[list[str], int] | None = None
     for number, line in enumerate(text.splitlines(), start=1):
         if ";" in line or "\t" in line.strip():
             line = _DECIMAL_COMMA.sub(".", line)
@@ -123,6 +125,9 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
             if not rows and not header and not any(is_number(cell) for cell in cells):
                 header = line
                 continue
+            if not rows and below is None and len(cells) == 2 and not any(map(NO_UNIT.match, cells)):
+                below = cells, number
+                continue
             raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not two numbers, x and y") from None
         if not (isfinite(x) and isfinite(y)):
             raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not finite")
@@ -131,7 +136,10 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
         raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
     # NumPy writes headings as a comment
     headings = re.split(r"[,;\t]|(?<=[\])])\s", header or comment)
-    units = [unit for heading in headings if (unit := heading_unit(heading))]
+    units = [heading_unit(heading) for heading in headings]
+    if below is not None:
+        units = units_below(units, *below, path)
+    units = [unit for unit in units if unit]
     return np.array(rows), units if header or len(units) == 2 else []
 
 

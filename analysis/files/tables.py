@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import zip_longest
 from math import isfinite, nan
 from pathlib import Path
 from typing import TextIO
@@ -109,7 +110,7 @@ def read_record(
     """Read columns of numbers, and the units in their headings, from a CSV file with commas, semicolons or tabs between cells.
 
     Where semicolons or tabs are between the cells, numbers may have a decimal comma. Headings are those of a header line, or
-    of a comment, ``# t [ms],x [mm]``, directly above the numbers.
+    of a comment, ``# t [ms],x [mm]``, directly above the numbers. A line of units, ``ms,mm``, may follow the header line.
 
     Parameters
     ----------
@@ -121,21 +122,23 @@ def read_record(
     Returns
     -------
     units : list of str
-        `heading_unit` of each column.
+        `heading_unit` of each column, or the unit below its heading.
     columns : list of ndarray
         Numbers as they are in the file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, has no headings where a name is given, has a cell that is not a finite number, or has a
-        number beyond the last column; the message gives the line.
+        If the file cannot be read, has no headings where a name is given, has a cell that is not a finite number, has a number
+        beyond the last column, or has two units for a column; the message gives the line.
     UnknownNameError
         If the file has no column of a given name.
     """
     path = Path(path)
     text = read_text(path).splitlines()
     lines = [(i, line) for i, line in enumerate(text, 1) if line.partition("#")[0].strip()]
+    if lines and lines[0][1].startswith("sep="):  # a line that Excel writes
+        del lines[0]
     # a comment above the numbers, as NumPy writes headings
     comment = text[lines[0][0] - 2].lstrip("# ") if lines and lines[0][0] > 1 else ""
     separator = _find_separator(lines[0][1]) if lines else ","
@@ -149,15 +152,20 @@ def read_record(
         return cell.strip() if separator == "," else cell.strip().replace(",", ".")
 
     header = [] if not rows or is_number(as_number(rows[0][1][0])) else rows.pop(0)[1]
+    units = [heading_unit(name) for name in header]
+    if header and rows and not any(map(NO_UNIT.match, rows[0][1])):
+        units = units_below(units, *rows.pop(0)[::-1], path)
     if not rows:
         raise InputError(f"{path} has no numbers: it must have rows of numbers, and may have a header line above them")
     if not header and len(above) == len(rows[0][1]):
         header = above
+        units = [heading_unit(name) for name in header]
     header = [name.strip() for name in header]
     short = [_UNIT.sub("", known).strip() for known in header]
     width = len(header or rows[0][1])
     places = []
-    for place, name in enumerate([None] * width if names is None else names):
+    for place, given in enumerate([None] * width if names is None else names):
+        name = given and given.strip()
         if name is not None and not header:
             raise InputError(
                 f"{path} has no headings, and so no column {name!r}: its columns are taken by their position"
@@ -169,7 +177,7 @@ def read_record(
         if any(is_number(as_number(cell)) for cell in cells[width:]):
             raise InputError(
                 f"{path}, line {number}: {len(cells)} cells in a table of {width} columns; numbers with a decimal comma need "
-                "semicolons or tabs between them"
+                "semicolons or tabs between them, and what is above the headings a # at its beginning"
             )
     columns = np.empty((len(places), len(rows)))
     for column, place in zip(columns, places):
@@ -178,7 +186,23 @@ def read_record(
             column[i] = float(own) if is_number(own) else nan
             if not isfinite(column[i]):
                 raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a finite number")
-    return [heading_unit(header[place]) if header else "" for place in places], list(columns)
+    return [units[place] if place < len(units) else "" for place in places], list(columns)
+
+
+#: A cell that cannot be a unit below a heading.
+NO_UNIT = re.compile(r"[\s\[(]*[-+.,]*(?:\d|(?:nan|inf|infinity)\s*$)", re.IGNORECASE)
+
+
+def units_below(units: Sequence[str], cells: Sequence[str], line: int, path: Path) -> list[str]:
+    """Return the units of columns from their headings, completed by the cells of the line below, such as ``ms`` or ``[mm]``.
+
+    Raises InputError if the two differ.
+    """
+    below = [cell.strip().strip("[]()- ") for cell in cells]
+    for one, other in zip(units, below):
+        if one and other and one != other:
+            raise InputError(f"{path}, line {line}: the unit {other!r} is below a heading with the unit {one!r}")
+    return [one or other for one, other in zip_longest(units, below, fillvalue="")]
 
 
 def _find_separator(line: str) -> str:

@@ -389,13 +389,22 @@ def test_csv_and_arrays_are_read_back(tmp_path):
         ("t[0],x[1]\n0,1\n", ["", ""], [[0.0], [1.0]]),
         ("t,x,\r\n0,1,\r\n2,3,\r\n,,\r\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
         (";\n0;1\n2;3;late\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
+        ("t,x\nms,mm\n0,1\n2,3\n", ["ms", "mm"], [[0.0, 2.0], [1.0, 3.0]]),
+        ("\ufeff t ; x ;\n [ms] ; (mm) ;\n\n 0 ; 1,5 ;\n 2 ; 3 ;\n", ["ms", "mm"], [[0.0, 2.0], [1.5, 3.0]]),
+        ("t [ms],x\n-,mm\n0,1\n2,3\n", ["ms", "mm"], [[0.0, 2.0], [1.0, 3.0]]),
+        ("sep=;\nt [s];x\n0,5;1\n2;3\n", ["s", ""], [[0.5, 2.0], [1.0, 3.0]]),
     ],
 )
 def test_columns_of_tables_as_people_write_them(tmp_path, text, units, columns):
-    (tmp_path / "x.csv").write_text(text, newline="")
+    (tmp_path / "x.csv").write_text(text, newline="", encoding="utf-8")
     found, numbers = read_record(tmp_path / "x.csv")
     assert found == units
     assert [column.tolist() for column in numbers] == columns
+
+
+def test_blanks_around_the_name_of_a_column_do_not_count(tmp_path):
+    (tmp_path / "x.csv").write_text(" t , x [mm] \n0,1\n2,3\n")
+    assert read_record(tmp_path / "x.csv", (" t", "x "))[0] == ["", "mm"]
 
 
 @pytest.mark.parametrize(
@@ -404,6 +413,10 @@ def test_columns_of_tables_as_people_write_them(tmp_path, text, units, columns):
         ("0,0\n0,5,1,5\n", None, "line 2: 4 cells in a table of 2 columns; numbers with a decimal comma need"),
         ("t,x\n0,0\n0,5,1\n", ("t", "x"), "line 3: 3 cells in a table of 2 columns"),
         ("0,1\n2,3\n", ("t", "x"), "has no headings, and so no column 't'"),
+        ("t [s],x [mm]\ns,cm\n0,1\n", None, "line 2: the unit 'cm' is below a heading with the unit 'mm'"),
+        ("t,x\nnan,nan\n0,1\n", None, "line 2, column 1: 'nan' is not a finite number"),
+        ("t x\n0 1\n2 3\n", None, "line 2, column 1: '0 1' is not a finite number"),
+        ("Device 5\nt,x\n0,1\n2,3\n", None, "what is above the headings a # at its beginning"),
         (f'# "{"1" * 200_000}",x\n0,1\n', None, "cannot be read: field larger"),
     ],
 )

@@ -401,6 +401,8 @@ def save(folder: Path, name: str, text: str) -> Path:
         " 0   0\n 1e0 0\n 1 , 2.5\n",
         "x;y\n0,0;0\n1,0;0,0\n1;2,5\n",
         "0,0\t0\n1,0\t0,0\n1.0,\t2.5\n",
+        "x;y\nmm;mm\n0,0;0\n1,0;0,0\n1;2,5\n",
+        "x [mm], y\n[mm], [mm]\n0,0\n1,0\n1,2.5\n",
     ],
 )
 def test_points_from_csv(tmp_path: Path, text: str) -> None:
@@ -456,7 +458,8 @@ def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
         ("x,y\n0,0\n1\n", "line 3: '1' is not two numbers"),
         ("0,0\n1,2,3\n", "line 2"),
         ("0,0\n1,two\n", "line 2: '1,two'"),
-        ("x,y\nlength,width\n1,2\n", "line 2"),
+        ("x,y\nlength,width\n1,2\n", "in 'length'"),
+        ("x [mm],y [mm]\ncm,cm\n1,2\n", "line 2: the unit 'cm'"),
         ("0,0\n1,inf\n", "line 2: '1,inf' is not finite"),
         ("0,zero\n1,1\n", "line 1"),
         ("x,y\n", "no points"),
@@ -464,7 +467,7 @@ def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
     ],
 )
 def test_bad_csv_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises((InputError, ParameterError), match=message):
         read_points(save(tmp_path, "a.csv", text))
 
 
