@@ -40,6 +40,10 @@ def density(value: Amount, name: str = "density") -> float:
     return _check_positive(quantity(value, "kg/m3", name), name)
 
 
+#: Upper bound of lengths (m): products of four lengths are still finite.
+LONGEST = 1e60
+
+
 def _check_positive(value: float, name: str) -> float:
     if value <= 0.0:
         raise ParameterError(name, value, "be greater than zero")
@@ -58,6 +62,8 @@ class _Section:
         for field in fields(self):
             value = getattr(self, field.name)
             number = density(value) if field.name == "density" else quantity(value, "m", field.name)
+            if field.name != "density" and number >= LONGEST:
+                raise ParameterError(field.name, value, f"be less than {LONGEST:g} m")
             object.__setattr__(self, field.name, _check_positive(number, field.name))
 
 

@@ -15,6 +15,7 @@ from linkwork.errors import LinkworkError, ParameterError
 
 from .. import files
 from ..files import Kinds, Many, Quantity, Table, entry
+from ..sections import LONGEST
 from .laws import Law, constants, law
 from .sections import SECTIONS
 
@@ -30,7 +31,11 @@ class LinkageError(LinkworkError):
 
 def coordinate(value: Any, name: str) -> float:
     """Read a length; the whole number 0 means that the coordinate is always zero and is not a parameter."""
-    return value if value == 0 and isinstance(value, int) and value is not False else Quantity("m")(value, name)
+    if value == 0 and isinstance(value, int) and value is not False:
+        return value
+    if abs(number := Quantity("m")(value, name)) >= LONGEST:
+        raise ParameterError(name, value, f"be within {LONGEST:g} m of zero")
+    return number
 
 
 def is_given(value: Any) -> bool:
@@ -96,7 +101,7 @@ class Body:
 
     points: Mapping[str, tuple[float, float]] = entry(_named_entries(_PLACE), factory=dict)
     bar: tuple[str, ...] = entry(Many(_name, length=2), ())
-    length: float = entry(Quantity("m", above=0.0), 0.0)
+    length: float = entry(Quantity("m", above=0.0, below=LONGEST), 0.0)
     mass: float | None = entry(Quantity("kg", least=0.0), None)
     inertia: float | None = entry(Quantity("kg.m2", least=0.0), None)
     cog: tuple[float, ...] | None = entry(_PLACE, None)

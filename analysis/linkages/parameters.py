@@ -403,6 +403,8 @@ def _mass(name: str, body: Body) -> _Mass | None:
             mass, centre, inertia = body.section.properties(body.length)
         except ParameterError as error:
             raise ParameterError(f"{where}.section.corners", error.value, error.requirement) from None
+        if not 0.0 < mass < inf:
+            raise LinkageError(f"{where}.section has a mass of {mass:g} kg: it must be above zero and finite")
         x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
         # a mass given together with a section was weighed; the radius of gyration remains that of the section
         own = mass if body.mass is None else body.mass

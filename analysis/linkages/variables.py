@@ -6,12 +6,16 @@ from collections.abc import Iterator, Mapping
 from math import floor, log10, pi
 from typing import NamedTuple
 
+from linkwork.errors import ParameterError
+
 from .description import is_given
 from .equations import Twist
 from .parameters import Drive, Interface, needs_turns
 from .structure import sliders
 from .writing import quote
 
+#: Least speed at which the duration of a turn is still a number (rad/s).
+_LEAST_SPEED = 1e-300
 #: Greatest number of steps of the default experiment of an FMU.
 _MOST_STEPS = 100_000
 
@@ -142,6 +146,11 @@ class Variables:
         without a drive, such as that of a pendulum on a crank, count only if no other angle moves.
         """
         moving = [d for d in self.interface.drives if d.turns and d.speed]
+        for d in moving:
+            if abs(d.speed) < _LEAST_SPEED:
+                raise ParameterError(
+                    f"linkage.freedoms.{d.name}.speed", d.speed, f"be 0 or at least {_LEAST_SPEED:g} rad/s"
+                )
         turns = [2.0 * pi / abs(d.speed) for d in [d for d in moving if d.table] or moving]
         if not turns:
             return 0.0, 1.0, 1e-3, 1e-9

@@ -290,10 +290,18 @@ def changed(path: str, value: Any) -> dict[str, Any]:
     return data
 
 
+BARE = {"bar": ["A", "B"], "length": "50 mm"}
+SECTION = {"kind": "bar", "width": "20 mm", "thickness": "5 mm", "material": "steel"}
 #: Wrong descriptions, and what the sentence must contain: the place, or the value with what would be right.
 MISTAKES = [
     ("bodies/crank/length", "-50 mm", "linkage.bodies.crank.length"),
     ("bodies/crank/length", "50 kg", "linkage.bodies.crank.length"),
+    ("bodies/crank/length", 1e308, "linkage.bodies.crank.length is 1e+308"),
+    ("ground/D", [-1e308, 0], "linkage.ground.D[0] is -1e+308"),
+    ("bodies/coupler/points", {"P": [0, 1e200]}, "linkage.bodies.coupler.points.P[1] is 1e+200"),
+    ("freedoms/crank/speed", 5e-324, "linkage.freedoms.crank.speed is 5e-324"),
+    ("bodies/crank", BARE | {"section": SECTION | {"width": 5e-324}}, "linkage.bodies.crank.section has a mass of 0 kg"),
+    ("bodies/crank", BARE | {"section": SECTION | {"width": 1e308}}, "width is 1e+308"),
     ("bodies/crank/length", None, "linkage.bodies.crank"),
     ("bodies/crank/lenght", "50 mm", "linkage.bodies.crank.length"),
     ("bodies/crank/bar", ["A"], "linkage.bodies.crank.bar"),
