@@ -140,6 +140,17 @@ def judge_shifts() -> tuple[Case, ...]:
     )
 
 
+def error_of_factor(inertia_ratio: float) -> float:
+    """Return the greatest error of the multipliers of (5.29) times the factor of (5.28), with the stated damper."""
+    region = hill_region(chapter_4(inertia_ratio))
+    found = slider_equation(chapter_4(inertia_ratio, STATED), crank_speed(0.5 * (region.low + region.high)))
+    psi1 = divide_by_mass(found.homogeneous(), ALL_HARMONICS).b
+    bare = equation_without_factor(inertia_ratio, found.damping)
+    by_factor = np.exp(-pi * psi1.mean) * hill_multipliers(bare.stiffened(found.spring))
+    whole = hill_multipliers(found.homogeneous().stiffened(found.spring))
+    return float(np.abs(np.sort_complex(by_factor) - np.sort_complex(whole)).max())
+
+
 def farthest(values: Iterable[float]) -> float:
     """Return the value that is farthest from 1."""
     return max(values, key=lambda x: abs(x - 1.0))
@@ -192,13 +203,16 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
         Statement(
             "It is clearly seen that regions of instability of the above system will resemble those obtained for the "
             "case of no damping but shifted by a small amount represented by the second order quantity of [1/4 "
-            "lambda_c^2 k0^2] in (5[.]30).",
-            text("5.2.1, L3628-3635"),
+            "lambda_c^2 k0^2] in (5[.]30). However, all solutions of this equation are multiplied by the factor [exp(-1/2 int "
+            "psi1 dtheta)] as shown in (5.28).",
+            text("5.2.1, L3628-3639"),
             f"regions 1 to 4 of (5.29) with omega_c = {STATED:g} 1/s and without a damper: shift of the middle in lambda_k^2 "
-            "k0 divided by the stated quantity; shift divided by lambda_k^2; width divided by that without a damper. The "
-            "largest deviation of I4 = 0.5, 1 and 1.5 is listed; right linear equation",
-            f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*",
-            judge_shifts(),
+            "k0 divided by the stated quantity; shift divided by lambda_k^2; width divided by that without a damper. Then the "
+            "Floquet multipliers of (5.29) times this factor over a turn, minus those of (5.27), in the middle of the first "
+            "region. The largest deviation of I4 = 0.5, 1 and 1.5 is listed; right linear equation",
+            f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*; 1e-6 for the multipliers, for "
+            "rounding errors",
+            (*judge_shifts(), at_most("multipliers", 1e-6, max(map(error_of_factor, COMPARED)))),
         ),
         Statement(
             "As would be expected the region is decreased in width as [omega_c] is increased.",
@@ -249,7 +263,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "growth of the width as above. Then, by the right linear equation at I4 = 1.5: omega_c that removes regions 1 "
             f"to 4, estimated from their widths; greatest multiplier beyond the zeroth boundary, at {fast:.0f} rad/s, with "
             f"{STATED:g} 1/s (L3921) and with a thousand times as much",
-            "none: the sign and the stability decide",
+            f"{STATED:g} 1/s, the value of L3921, for omega_c; otherwise none: the sign and the stability decide",
             (
                 at_most("growth of the width", 0.0, growth),
                 at_most("omega_c", STATED, max(removing_estimate(mechanism, n) for n in range(1, 5)), "1/s"),
