@@ -143,6 +143,10 @@ class TestSearch:
             for away, expected in zip(search.residuals(self.vector(linkage)), sides):
                 assert away @ away == pytest.approx(expected, rel=1e-9)
             assert search.error(self.vector(linkage)) == pytest.approx(min(sides), rel=1e-9)
+        other = PROBLEMS["ellipse-b"]
+        assert search.error(self.vector(other.linkage), semi_axis=15.0) == pytest.approx(
+            other.linkage_error(other.linkage), rel=1e-9
+        )
 
     def test_its_rocker_error_is_that_of_the_package(self) -> None:
         p = PROBLEMS["rocker"]

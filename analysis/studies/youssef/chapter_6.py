@@ -45,21 +45,22 @@ for a curve with or without timing, or for a function of the rocker's angle. The
 with their errors.
 
 **What stands.** The area by triangles is the area between the curves if the partners are chosen. The crank's phase does not
-change this area, and both closures of the links have to be tried. Weights act as stated. The linkages for ellipse and path (b)
-are less accurate than those for (a), which are close. The printed linkage for path (b) has the stated area once a digit is
-mended, and the packaging machine's push is straight to 3 % of its length. Searches that begin with 12 of the 72 points reach
-lower errors with fewer evaluations; searches that begin with 36 reach lower errors, but not with fewer evaluations.
+change this area, and both closures of the links have to be tried. Weights act as stated. The linkages for ellipse and path
+(b) are less accurate than those for (a), which are close. The printed linkage for path (b) has the stated area once a digit
+is mended, and the packaging machine's push is straight to 3 % of its length. Searches that begin with 12 of the 72 points
+reach lower errors with fewer evaluations; searches that begin with 36 reach lower errors, but not with fewer evaluations.
 
-**What does not.** Six of the seven errors are not those of the printed linkages, even with the misprints that we found mended
-and each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. The errors of the two rocker
-functions differ from the stated ones by 0.3 to 0.4 % in the nearest of many readings. The linkages for ellipses and paths are
-not minima (L5136), and within our limits other linkages have a fortieth to a fifth of their errors (L7026). The search itself,
-repeated from the program, always stops before it reaches a minimum. Starting with five of the ten parameters gains nothing.
-Starting with nine gives lower errors, but needs more evaluations.
+**What does not.** Six of the seven errors are not those of the printed linkages, even with the misprints that we found
+mended and each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. The errors of the two
+rocker functions differ from the stated ones by 0.3 to 0.4 % in the nearest of many readings. The linkages for ellipses and
+paths are not minima (L5136), and within our limits other linkages have a fortieth to a fifth of their errors (L7026). The
+search itself, repeated from the program, always stops before it reaches a minimum. Starting with five of the ten parameters
+gains nothing. Starting with nine gives lower errors, but needs more evaluations.
 
 **Our limits.** Without bounds the problem has no solution: the longer the links, the smaller the error. Therefore none of our
 links is longer than the longest of the printed linkage (Fig 6.6: its printed bounds, and r at most 30 cm), and the
-transmission angle is at least 40 deg. For the rocker functions the crank turns fully instead.
+transmission angle is at least 40 deg. For the rocker functions the crank turns fully instead. Remarks on methods in general
+(L4055 to 4082) and descriptions of the program (L5146 to 5156) claim nothing that can be measured, and have no verdict.
 """
 
 FloatArray = NDArray[np.float64]
@@ -124,7 +125,7 @@ def _ellipse_a() -> tuple[Statement, ...]:
             "fact has an error value [E1p] of 0.889 cm2.",
             text("6.4.2 A, L4864"),
             f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}. For *favourably*, the rms "
-            "distance relative to the ellipse's longer semi-axis",
+            "distance of the linkage as printed, relative to the ellipse's longer semi-axis",
             f"{HALF}; {ALIKE:g}, the rule for *the same*",
             (judge_stated_error("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
         ),
@@ -312,7 +313,8 @@ TABLE = {
         "rocker-weighted",
         "With a weight of 1000 from 60 to 260 degrees, the rocker function is generated with an error of 35.0 deg2.",
         _weighted,
-        READING,
+        "The crank angles and the window are read as at Fig 6.7. The mounting angle in the plot, by which the output is turned "
+        "on the rocker, is ours.",
     ),
     "6.9": Row(
         "path-a",
