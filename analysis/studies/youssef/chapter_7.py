@@ -25,25 +25,26 @@ so that the slider can correct what the links cannot trace. The chapter finds th
 exact at each crank angle, and by a direct search for a Fourier series.
 
 **What stands.** Precision points may be kept while the motion between them changes. The coupler that points at the desired
-point gives exactly the least error. Two harmonics of the slider can reduce the error of all eight problems of chapter VI; that
-of the weighted rocker function falls to a fiftieth if the stroke is not limited. For path (b) the printed series gives the
-stated 4.3 cm2, within the rounding of its numbers, once l4 is mended as in chapter VI and A0 = 3.1 is read as 0.31. A
-series with enough terms reaches what the variational method reaches. Cams of a few centimetres can drive such a slider. We
-tried a machine with twice the friction of the model, coupler and slider heavier by a tenth and a load of 6 N: a drive without
-feedback fails within half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
+point gives exactly the least error. Two harmonics of the slider can reduce the error of all eight problems of chapter VI;
+that of the weighted rocker function falls to a fiftieth if the stroke is not limited. For path (b) the printed series gives
+the stated 4.3 cm2, within the rounding of its numbers, once l4 is mended as in chapter VI and A0 = 3.1 is read as 0.31; it
+is then within 5 % of the best that we find. A series with enough terms reaches what the variational method reaches. Cams of
+a few centimetres can drive such a slider. We tried a machine with twice the friction of the model, coupler and slider
+heavier by a tenth and a load of 6 N: a drive without feedback fails within half a turn, and feedback holds the motion to a
+quarter of a per cent of the stroke.
 
 **What does not.** The envelope has a hole where all curves of the family go round the same region. For two of our limits of
 U, P reaches only 74 and 89 % of the area within the envelope; with U from -1.5 to 1.5, where the crank turns fully except at
-+-0.5, it reaches all. If the coupler cannot point at the desired point, the rocker need not stand upright: for places below the
-slider's line it hangs. The printed series for the rocker function does not give the stated 4.8 deg2 in any reading that we
-tried (of its signs, of A0 and of its argument). As printed, the links cannot be joined; in the readings in which they can, the
-error is greater than with the pivot fixed. The printed series for path (b) is within 5 % of the best that we find.
++-0.5, it reaches all. If the coupler cannot point at the desired point, the rocker need not stand upright: for places below
+the slider's line it hangs. The printed series for the rocker function does not give the stated 4.8 deg2 in any reading that
+we tried (of its signs, of A0 and of its argument). As printed, the links cannot be joined; in the readings in which they
+can, the error is greater than with the pivot fixed.
 
 **What cannot be told.** Series 1 (Fig 7.4 to 7.10) rests on a desired curve that is lost. We draw its figures with a curve of
 our own, and give no verdict on what the thesis says about the lost curve. For a mechanism that corrects itself, the thesis
 states neither the adjustment nor the criterion. Methods that are only named, such as teach-in, latches or further inputs,
 have no example to judge. Remarks on the field and on the choice of a method (L5171 to 5201, 5276 to 5289, 5331, 5393, 5782,
-5877, 5892) claim nothing that can be measured, and have no verdict.
+5877, 5892) are general knowledge or opinions, and have no verdict.
 """
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -68,6 +69,14 @@ def coupler_point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
     """Return the coupler point P (l3, complex) at crank rotations (rad) with the slider at u = U - 1."""
     u = np.asarray(u, dtype=float) + np.zeros_like(rotation)
     return np.asarray(LINKAGE.path(rotation, (u, np.zeros_like(u))) @ np.array([1.0, 1j]))
+
+
+def pointing_positions(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return a and b of U = a +- sqrt(b), eq (7.14): the slider positions at which the coupler points at the target."""
+    l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
+    th3 = np.angle(target - l2 * np.exp(1j * rotation))
+    centre = l2 * np.cos(rotation) + l3 * np.cos(th3)
+    return centre, centre**2 - (l2**2 + l3**2 - l4**2 + 2.0 * l2 * l3 * np.cos(rotation - th3))
 
 
 def slider(linkage: Linkage) -> SliderMotion:
@@ -109,6 +118,9 @@ def family() -> StudyResult:
     phi, along = (x.ravel() for x in np.meshgrid(TURN, ALONG))
     radii = np.abs(coupler_point(phi, along) - LINKAGE.crank_length * np.exp(1j * phi))
     off_arc = np.abs(radii - LINKAGE.point_distance).max()
+    middle, square = pointing_positions(phi, coupler_point(phi, along))
+    root = np.sqrt(np.maximum(square, 0.0))
+    off_slider = np.abs(np.abs(1.0 + along - middle) - root).max()
     return StudyResult(
         number="7.2",
         claim="With the slider free, P reaches any point on or within the outer boundaries of the family of coupler curves.",
@@ -151,12 +163,14 @@ def family() -> StudyResult:
             Statement(
                 "Such 'isochronous' curves, which are arcs of circles centred at the corresponding fixed position, of B, can "
                 "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
-                "continuous variation of U is specified.",
-                text("7.0, L5260"),
-                f"distance of P from B minus r: its greatest size at {TURN.size - 1} crank angles and {ALONG.size} values of "
-                f"U from {1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}",
-                "1e-12 l3, for rounding errors",
-                (at_most("", 1e-12, off_arc, "l3"),),
+                "continuous variation of U is specified. Alternatively, they may be regarded as providing a starting point "
+                "from which a desired variation in U may be deduced.",
+                text("7.0, L5260-5272"),
+                f"distance of P from B minus r, at {TURN.size - 1} crank angles and {ALONG.size} values of U from "
+                f"{1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}; then U deduced from the place of P on its arc, by the nearer root "
+                "of (7.14), minus U: the greatest size of each",
+                "1e-12 l3, for rounding errors, and 1e-6 l3 for U, which a square root gives",
+                (at_most("P off its arc", 1e-12, off_arc, "l3"), at_most("U deduced from P", 1e-6, off_slider, "l3")),
                 "once theta2 and U are given, P is one point of the arc",
             ),
         ),

@@ -25,7 +25,7 @@ from ...synthesis import Search, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .chapter_7 import FAMILY, LINKAGE, TARGET, TURN, coupler_point, path_curve, plane, slider, xy
+from .chapter_7 import FAMILY, LINKAGE, TARGET, TURN, coupler_point, path_curve, plane, pointing_positions, slider, xy
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -91,14 +91,6 @@ def all_terms_excess(curves: int = 20, seed: int = 11) -> float:
         u = FourierSeries.from_samples(best.u)(steps)
         found.append(float((np.abs(coupler_point(rotation, u) - wanted) ** 2).sum() / best.squared_error - 1.0))
     return max(found)
-
-
-def pointing_positions(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return a and b of U = a +- sqrt(b), eq (7.14): the slider positions at which the coupler points at the target."""
-    l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
-    th3 = np.angle(target - l2 * np.exp(1j * rotation))
-    centre = l2 * np.cos(rotation) + l3 * np.cos(th3)
-    return centre, centre**2 - (l2**2 + l3**2 - l4**2 + 2.0 * l2 * l3 * np.cos(rotation - th3))
 
 
 def vertical_tangents() -> list[float]:
