@@ -141,10 +141,16 @@ def sensitivities(
     ------
     ParameterError
         If an error or a quantity does not exist.
+    InputError
+        If an error is given more than once.
     """
     require_turn(turn)
     check_names(errors, ERRORS, "error")
     check_names(quantities, QUANTITIES, "quantity")
+    # the last error of a name would take the derivatives from the others
+    for name in errors:
+        if (times := list(errors).count(name)) > 1:
+            raise InputError(f"{name} is given {times} times: give it once")
     n, m = len(turn), len(errors)
     found, _ = perturb(turn, np.arange(n), error_variables(errors, n)).evaluate(quantities)
     values, derivatives = {}, {}

@@ -461,6 +461,8 @@ def test_wrong_input_is_reported() -> None:
         sensitivities(turn, quantities=["crank_pin.f"])
     with pytest.raises(ParameterError, match=r"rod\.colour"):
         sensitivities(turn, ["rod.colour"])
+    with pytest.raises(InputError, match=r"rod\.length is given 2 times"):
+        sensitivities(turn, ["rod.length", "guide.twist", "rod.length"])
     with pytest.raises(ParameterError, match=r"rod\.mass"):
         sensitivities(turn).derivative("slider.position", "rod.mass")
     with pytest.raises(InputError, match="no tolerance"):
