@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from click.testing import CliRunner
 
 from analysis import cli
 from analysis.mechanisms import PUBLISHED
@@ -102,6 +103,16 @@ def test_every_erratum_has_its_test(name, last):
             code = (ROOT / file).read_text()
             for test in filter(None, names):
                 assert re.search(rf"^\s*(def|class) {test}\b", code, flags=re.MULTILINE), f"{file}: {test}"
+
+
+def test_the_commands_of_rahmans_recommendations_run(tmp_path):
+    """As the table gives them, apart from plots."""
+    table = (ROOT / "docs" / "rahman.md").read_text().split("## Recommendations")[1].split("## ")[0]
+    commands = set(re.findall(r"`linkwork (slider-crank [^`]*)`", table))
+    assert len(commands) == 5
+    for command in commands:
+        ran = CliRunner().invoke(cli.main, [*shlex.split(command), "--no-plot", "--force", "--out", str(tmp_path)])
+        assert ran.exit_code == 0, f"{command}: {ran.output}"
 
 
 def test_links_in_the_documentation_lead_somewhere():

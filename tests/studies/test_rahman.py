@@ -474,6 +474,16 @@ class TestMethod:
         """51a has roundoff in the component i of the slider's momentum, which 53a prints as 0."""
         assert {case.label: case.computed for case in forces._roundoffs()}["slider, component i"] == 0.0
 
+    def test_the_roundoff_is_that_of_single_precision_throughout(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Not one number is in double precision: it would round what is computed with it less."""
+        seen, both = [], forces._both_paths
+        monkeypatch.setattr(forces, "_both_paths", lambda *given: seen.append(given) or both(*given))
+        short, long = forces.momenta_at(np.float32), forces.momenta_at(np.float64)
+        (c, b, q, r), _ = seen
+        numbers = [*c, b.g1, b.g2, b.crank_square, *b.masses, *b.rod_squares, *b.slider_squares, *q, *r]
+        assert {number.dtype for number in numbers} == {np.dtype(np.float32)}
+        assert 0.0 < np.abs(short - long).max() < 1e-4 * np.abs(long).max()
+
     def test_a_turn_in_the_plane_does_not_depend_on_its_start(self) -> None:
         """A start that is off by 0.01 rad and in takes more corrections at the first angle, and ends at the same loops."""
         planar, off = (turn(parameters(10.0), 0.0, off=by) for by in (0.0, 0.01))

@@ -25,10 +25,12 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
     | {number: Entry(figure.title, "rahman.figures", figure.place) for number, figure in table.FIGURES.items()}
     | {
         "rahman-closure": Entry(
-            "Rahman's loop closure and its iteration", "rahman.closure", "sections 2.2 to 2.6, 3.2, 3.3"
+            "Rahman's loop closure and its iteration", "rahman.closure", "abstract, sections 2.3 to 2.6, 3.2, 3.3"
         ),
-        "rahman-rates": Entry("Rahman's rates: velocities and accelerations", "rahman.rates", "sections 2.7, 2.8"),
-        "rahman-forces": Entry("Rahman's force equations in the plane", "rahman.forces", "sections 2.8, 3.1"),
-        "rahman-conclusions": Entry("Rahman's conclusions on his method", "rahman.conclusions", "section 3.3"),
+        "rahman-rates": Entry("Rahman's rates: velocities and accelerations", "rahman.rates", "sections 2.7, 2.8, 3.2"),
+        "rahman-forces": Entry(
+            "Rahman's force equations, and forces in the plane at a4 = 10 in", "rahman.forces", "sections 2.8, 3.1, 3.2"
+        ),
+        "rahman-conclusions": Entry("Rahman's conclusions on his method", "rahman.conclusions", "sections 3.2, 3.3"),
     }
 )

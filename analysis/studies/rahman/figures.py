@@ -253,11 +253,17 @@ def _forces() -> tuple[Statement, ...]:
             "30 deg instead, two or three components increase",
         ),
         Statement(
+            "So proper design is necessary for the safe operation of the engine, considering that factor [the increase of "
+            "forces and torques].",
+            text("section 3.3, L1125"),
+            why="advice, not a finding",
+        ),
+        Statement(
             "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
             "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
             text("section 3.3, L1125"),
-            "number of poles (spikes) of each component in a turn, in the nine cases beside the ideal one, except where the "
-            "component vanishes; the number that differs most from the stated one is listed. Then, for each case, the "
+            "number of poles (spikes) of each component in a turn, in the nine cases other than the ideal one, except where "
+            "the component vanishes; the number that differs most from the stated one is listed. Then, for each case, the "
             "greatest distance of its dead centres, where the poles lie, from 100 and 300 deg",
             f"none for a number of spikes; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
@@ -378,7 +384,8 @@ def _constant() -> tuple[Statement, ...]:
             "torque [1T1k] is applied constantly.",
             text("section 2.8, L945"),
             f"greatest difference of the axial force from m1 S1'', {FROM_DEAD}: in the nine cases of constant shift, and "
-            "with a sinusoidal shift by eq 28 of which amplitude and alpha are our choice",
+            "with a sinusoidal shift by eq 28, of which amplitude and alpha are our choice; its dead centres are where S4 at a "
+            "constant S1 turns back",
             ROUNDING,
             (
                 *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -70,6 +71,8 @@ G3 = 2.0
 PATHS = "errata 3, 4: out of the plane the two paths give different velocities"
 #: Weight of water (lb/in3), the reference of specific gravities.
 WATER = 62.43 / 12.0**3
+#: One of the named tuples of `printed`.
+Named = TypeVar("Named", Bodies, Crank, Joints)
 #: Components of the joint forces in the plane.
 PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
@@ -148,16 +151,17 @@ def velocity_paths() -> list[Judged]:
     for case in (PLANE, *ROW_F):
         q = _clear_joints(case)
         r = joint_rates(CRANK_AT_SPEED, q)
-        apart = [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in zip(*_both_paths(b, q, r))]
+        pairs = zip(*_both_paths(CRANK_AT_SPEED, b, q, r))
+        apart = [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
         found.append(nothing(case.name, apart, "lb.s"))
     return found
 
 
-def _both_paths(b: Bodies, q: Joints, r: Joints) -> tuple[tuple[Dual, Dual], tuple[Dual, Dual]]:
+def _both_paths(c: Crank, b: Bodies, q: Joints, r: Joints) -> tuple[tuple[Dual, Dual], tuple[Dual, Dual]]:
     """Return the momenta of rod and slider by eqs 50a and 51a, and by eqs 52a and 53a."""
-    rod = forward_rod_momentum(CRANK_AT_SPEED, b, q, r) * b.masses[1]
-    _, *mixed = momenta(CRANK_AT_SPEED, b, q, r)
-    return (rod, forward_slider_momentum(CRANK_AT_SPEED, b, q, r, 0.0)), (mixed[0], mixed[1])
+    rod = forward_rod_momentum(c, b, q, r) * b.masses[1]
+    _, *mixed = momenta(c, b, q, r)
+    return (rod, forward_slider_momentum(c, b, q, r, 0.0)), (mixed[0], mixed[1])
 
 
 def replacements() -> list[Judged]:
@@ -179,20 +183,34 @@ def replacements() -> list[Judged]:
     return found
 
 
+def _rounded(values: Named, kind: type[np.floating[Any]]) -> Named:
+    """Return the numbers of a named tuple in single precision, then as ``kind``."""
+    singles = (np.asarray(x, np.float32).astype(kind) for x in values)
+    numbers: Any = [tuple(x) if isinstance(old, tuple) else x[()] for x, old in zip(singles, values)]
+    return type(values)(*numbers)
+
+
+def momenta_at(kind: type[np.floating[Any]]) -> FloatArray:
+    """Return the momenta over a turn in the plane, computed in the precision ``kind`` from numbers of single precision.
+
+    The axes of the result are the path as in `_both_paths`, the body (rod, slider), the crank angle, and the component.
+    """
+    q = joints(planar(parameters(PLANE.offset_in), np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
+    c, b, q = _rounded(CRANK_AT_SPEED, kind), _rounded(bodies(parameters()), kind), _rounded(q, kind)
+    paths = _both_paths(c, b, q, joint_rates(c, q))
+    return np.array([[np.concatenate([h.real, h.dual], -1) for h in path] for path in paths], dtype=kind)
+
+
 def _roundoffs() -> list[Judged]:
-    """Judge the greatest roundoff errors of momenta in single precision in the plane: by eqs 50a, 51a and by eqs 52a, 53a."""
-    p, b = parameters(PLANE.offset_in), bodies(parameters())
-    single = Joints(*(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH]).T.astype(np.float32))
-    found = []
-    for q in (single, Joints(*(x.astype(float) for x in single))):
-        paths = _both_paths(b, q, joint_rates(CRANK_AT_SPEED, q))
-        found.append([[np.concatenate([h.real, h.dual], -1) for h in path] for path in paths])
-    by_forward, by_mixed = np.abs(np.array(found[0], dtype=float) - np.array(found[1])).max(-2)
+    """Judge the roundoff errors of momenta in single precision in the plane: by eqs 50a, 51a and by eqs 52a, 53a."""
+    short, long = momenta_at(np.float32), momenta_at(np.float64)
+    by_forward, by_mixed = np.sqrt(np.mean((short - long) ** 2, axis=-2))
     names = [f"{part}component {axis}" for part in ("", "moment, ") for axis in "ijk"]
     judged = []
     for body, ones, others in zip(("rod", "slider"), by_forward, by_mixed):
         judged += [
-            at_most(f"{body}, {name}", 1.0, other / one)
+            # two digits: the size depends on the order of the operations
+            at_most(f"{body}, {name}", 1.0, float(f"{other / one:.2g}"))
             for name, one, other in zip(names, ones, others)
             if one or other
         ]
@@ -304,12 +322,13 @@ def _momentum_rates() -> tuple[Statement, ...]:
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
-            "greatest roundoff over a turn, at every half degree, of each component of the momenta in the plane, a4 = 10 "
-            "in: its value in single precision minus that in double precision. The roundoff by 52a and 53a is divided by "
-            "that by 50a and 51a; components without roundoff by either are left out",
+            "roundoff of each component of the momenta in the plane, a4 = 10 in: its value in single precision minus that in "
+            "double precision, as root mean square over the half degrees of a turn. The roundoff by 52a and 53a is divided "
+            "by that by 50a and 51a; components without roundoff by either are left out",
             "none, the sign decides",
             tuple(_roundoffs()),
-            "for component i of the rod, 52a has the roundoff of S4' in addition",
+            "for component i of the rod, 52a has the roundoff of S4' in addition. The sizes depend on the order in which an "
+            "equation is computed",
         ),
     )
 

@@ -312,7 +312,8 @@ def _denominators() -> Statement:
             *zeros,
             at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(np.abs(sines).min())), "deg"),
         ),
-        "theta2 is 0 or half a turn at the dead centres, and the offset moves the dead centres",
+        "theta2 is 0 or half a turn at the dead centres, and the offset moves the dead centres. The only divisor "
+        "printed in 38a, 39a and 42a is sin theta3, which is never close to zero",
     )
 
 
