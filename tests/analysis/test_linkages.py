@@ -37,7 +37,7 @@ from analysis.periodic import (
     search_orbits,
     steady_drive,
 )
-from analysis.run import Inputs, Trajectory, cosimulate, load_case, simulate, simulate_many
+from analysis.run import Inputs, TorsionBar, Trajectory, cosimulate, load_case, simulate, simulate_many
 from analysis.tuning import Limit, Wish, tune
 from analysis.tuning.conditions import limited_value, sample_turn
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -1220,6 +1220,23 @@ def folded_slot() -> Any:
     built = linkage("folded", ground={"A": (0, 0), "D": ("100 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
     built.body("lever", points={"D": (0, 0)}, mass=1.0, inertia=0.01).slot("S", pin="B", on="lever", through="D")
     return built.freedom("crank", "A", start="1e-9 rad")
+
+
+def test_a_clockwise_torsion_bar_is_the_mirror_of_a_counterclockwise_one() -> None:
+    runs = []
+    for name, law, torque in (
+        ("clockwise-bar", "t*max(1 + x/r, 0)", 0.0),
+        ("counterclockwise-bar", None, TorsionBar(torque="0.5 N.m")),
+    ):
+        built = linkage(name, ground={"A": (0, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=0.2, inertia=1e-4)
+        if law:
+            built.spring("bar", at="A", law=law, constants={"t": "0.5 N.m", "r": "1 rad"})
+        made = built.freedom("crank", "A", start=0.0).mechanism()
+        known = made.published[name]
+        run = simulate(known.parameters, Inputs(torque=torque), initial=known.initial, stop_time=0.1)
+        runs.append(run["crank.angle"])
+    assert runs[1][-1] > 2.0
+    np.testing.assert_allclose(runs[0], -runs[1], atol=1e-7)
 
 
 #: Linkages that are refused, and the sentence; those that are one entry of the four-bar are among `MISTAKES`.
