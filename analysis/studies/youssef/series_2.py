@@ -176,7 +176,7 @@ def best_error_ratios() -> Mapping[str, float]:
 
 def _error_ratio(task: Task, linkage: Linkage) -> float:
     unknown = SliderUnknown(harmonics=2, stroke=0.2 * linkage.largest_link)
-    return slider_motion(task, linkage, unknown, search=Search(starts=2)).best.error / evaluate(task, linkage).error
+    return slider_motion(task, linkage, unknown, search=Search(starts=8)).best.error / evaluate(task, linkage).error
 
 
 def moved_rocker() -> StudyResult:
