@@ -24,7 +24,7 @@ from analysis.studies.youssef.series_2 import (
     rocker_motion,
     slider,
 )
-from analysis.synthesis import Linkage, SliderMotion
+from analysis.synthesis import Linkage, SecondCrank, SliderMotion
 from analysis.youssef import accessible_area
 from linkwork.five_bar import kinematics
 
@@ -56,6 +56,20 @@ class TestControl:
     def test_no_trial_cycle_is_worse_than_the_one_before(self, harmonics: int) -> None:
         errors = [control.rms(deviation) for deviation in control.run_trials(harmonics)]
         assert (np.diff(errors) < 0.0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [ROCKER, PATH])
+def test_no_second_crank_nearby_is_better(name: str) -> None:
+    """Another length or phase, or another ratio of the gears, of the crank that moves the rocker pivot."""
+    found = control.with_second_crank(name)
+    assert isinstance(found.pivot, SecondCrank)
+    least = linkage_error(name, found)
+    assert least < linkage_error(name, PROBLEMS[name].linkage)
+    others = [replace(found.pivot, ratio=ratio) for ratio in control.GEARS if ratio != found.pivot.ratio]
+    for factor, turned in ((0.95, 0.0), (1.05, 0.0), (1.0, -0.05), (1.0, 0.05)):
+        others.append(replace(found.pivot, length=factor * found.pivot.length, phase=found.pivot.phase + turned))
+    assert all(linkage_error(name, replace(found, pivot=pivot)) > least for pivot in others)
 
 
 def test_cam() -> None:

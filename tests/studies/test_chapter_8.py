@@ -55,6 +55,10 @@ class TestPulses:
         found = 2.0 * np.abs(np.fft.rfft(pulses)[order]) / len(pulses)
         assert found == pytest.approx(0.044 * np.sinc(order / 60.0), rel=1e-3)
 
+    def test_its_error_is_what_the_average_takes_away(self) -> None:
+        speed = 44.0 * (1.0 + 1e-3 * np.cos(12.0 * np.linspace(0.0, 2.0 * np.pi, 14401) + np.pi / 5.0))
+        assert instruments.pulse_error(speed) == pytest.approx(1e-3 * (1.0 - np.sinc(12.0 / 60.0)), rel=0.1)
+
     def test_speed_by_the_energy(self) -> None:
         """Kinetic energy gained from the least to the greatest speed is the work of the torques in between."""
         inertia = 2e-2
@@ -249,6 +253,14 @@ class TestRig2:
         for speed in (200.0, 400.0, 700.0, 1000.0):
             full = rigs.harmonic(rigs.turn(spring, speed), 2) / rig_2.length(spring)
             assert rig_2.linear_motion(spring, speed).harmonic(2) == pytest.approx(full, rel=0.1)
+
+    def test_the_ratio_to_a_single_mass_is_that_farthest_from_one(self) -> None:
+        """With C, the second harmonic raises the amplitude at 300 rpm, and at 700 rpm there is the first alone."""
+        low, high = np.array([300.0]), np.array([700.0])
+        both = np.append(low, high)
+        alone = rig_2._unbalance_ratio("C", high, 1.0)
+        assert rig_2._unbalance_ratio("C", both, alone) == rig_2._unbalance_ratio("C", low, alone) > 1.5
+        assert rig_2._unbalance_ratio("C", both, 3.0 * alone) == pytest.approx(1.0 / 3.0)
 
     def test_a_damper_widens_the_resonance_in_proportion(self) -> None:
         """That of a lightly damped mass on a spring is mu / m."""

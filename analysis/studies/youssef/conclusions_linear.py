@@ -152,7 +152,7 @@ def judge_introduction() -> tuple[Statement, ...]:
             f"= 0.8 to 1.2 at I4 = 2; estimated by the {RIGHT} from the widths without a damper",
             f"{SMALL:g}, the rule for *small*",
             tuple(at_most(name, SMALL, share) for name, share in removing.items()),
-            "the slider's fall beyond the zeroth boundary is judged at L3952",
+            "*the instability* is that of the sentence before; the slider's fall beyond the zeroth boundary is judged at L3952",
         ),
     )
 
@@ -167,6 +167,15 @@ def _on_resonance() -> tuple[Statement, ...]:
     each = [(i, damper) for i in RESONANT for damper in (WEAK, STRONG)]
     first, second = ({which: harmonic(n, *which) for which in each} for n in (1, 2))
     five = {which: [harmonic(n, *which, 5) for n in range(1, 6)] for which in each}
+    # of the second harmonic, and of the third to fifth, to the first
+    of_greatest = (
+        max(second[x].max() / first[x].max() for x in each),
+        max(np.max(higher) / one.max() for one, _, *higher in five.values()),
+    )
+    of_each = (
+        max((second[x] / first[x]).max() for x in each),
+        max((higher / one).max() for one, _, *higher in five.values()),
+    )
     speeds = np.array([resonance(chapter_4(i))[0] for i in RATIOS])
     bend = np.abs(speeds - np.polyval(np.polyfit(RATIOS, speeds, 1), RATIOS)).max() / np.ptp(speeds)
     # by damper, then by inertia
@@ -191,20 +200,15 @@ def _on_resonance() -> tuple[Statement, ...]:
             text("9.1, L7104"),
             "second harmonic, and greatest of the third to fifth, relative to the first: the greatest values of each, and "
             "the values at the same speed. The largest ratio is listed, for speeds, I4 and dampers of the row before",
-            f"{SMALL:g}, the rule for *negligible*",
-            (
-                at_most("second, greatest over greatest", SMALL, max(second[x].max() / first[x].max() for x in each)),
-                at_most("second, at the same speed", SMALL, max((second[x] / first[x]).max() for x in each)),
-                at_most(
-                    "third to fifth, greatest over greatest",
-                    SMALL,
-                    max(np.max(higher) / one.max() for one, _, *higher in five.values()),
-                ),
-                at_most(
-                    "third to fifth, at the same speed",
-                    SMALL,
-                    max((higher / one).max() for one, _, *higher in five.values()),
-                ),
+            f"1, since the *major* harmonic is the greater; {SMALL:g}, the rule for *negligible*",
+            tuple(
+                at_most(f"{which}; {how}", bound, ratio)
+                for how, ratios in (("greatest over greatest", of_greatest), ("at the same speed", of_each))
+                for which, bound, ratio in (
+                    ("first major", 1.0, max(ratios)),
+                    ("second", SMALL, ratios[0]),
+                    ("third to fifth", SMALL, ratios[1]),
+                )
             ),
             "near half and a third of the natural frequency the second and the third harmonic have their own resonances",
         ),

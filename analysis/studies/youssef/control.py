@@ -14,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from math import pi, radians, tan
+from itertools import product
+from math import exp, pi, radians, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...linear import Design, design_pid, linearise_orbit
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
-from ...synthesis import Linkage, turn
+from ...synthesis import Linkage, SecondCrank, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, READ, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
@@ -54,6 +55,8 @@ CHANGED = (-15.0, -9.0)
 TRIALS, HARMONICS = 6, (8, 16)
 #: First step (m) of a search on the machine, and number of runs in it.
 STEP, SEARCHED = 8e-3, 25
+#: Gear ratios of a second crank, turns per turn of the first, and the error of links that cannot be joined.
+GEARS, REFUSED = (1, -1, 2, -2), 1e6
 #: Largest pressure angle of a cam (rad), the usual limit of a follower that slides, and radius of its roller (cm).
 PRESSURE, ROLLER = radians(30.0), 1.0
 
@@ -146,6 +149,30 @@ def search_on_machine() -> tuple[float, float]:
     return error(start), float(minimize(error, start, method="Nelder-Mead", options=options).fun)
 
 
+@cache
+def with_second_crank(name: str) -> Linkage:
+    """Return the printed links of a problem with the rocker pivot on a second crank, geared to the first, of least error.
+
+    The second crank turns about the printed place of the pivot. Its ratio is one of `GEARS`; its length and its phase are found
+    by downhill simplexes.
+    """
+    printed = PROBLEMS[name].linkage
+
+    def linkage(x: NDArray[np.float64], ratio: int) -> Linkage:
+        return printed.with_pivot(SecondCrank(length=exp(x[0]) / CM_PER_METRE, ratio=ratio, phase=float(x[1])))
+
+    def error(x: NDArray[np.float64], ratio: int) -> float:
+        return min(linkage_error(name, linkage(x, ratio)), REFUSED)
+
+    found = []
+    for ratio, phase in product(GEARS, turn(4)):
+        start = np.array([0.0, phase])
+        options = {"initial_simplex": np.vstack([start, start + 0.5 * np.eye(2)]), "maxfev": 150}
+        found.append((minimize(error, start, args=(ratio,), method="Nelder-Mead", options=options), ratio))
+    best, ratio = min(found, key=lambda pair: pair[0].fun)
+    return linkage(best.x, ratio)
+
+
 class Cam(NamedTuple):
     """Plate cam: least radius of curvature of its pitch curve where this is convex (cm), and the pitch curve (cm)."""
 
@@ -218,12 +245,13 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
             text("7.1.1 (a), L5301-5309"),
             "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
-            "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a Scotch "
-            "yoke, the weighted error of the rocker function with one harmonic, relative to that with the pivot fixed",
+            "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a secondary "
+            "linkage, our example is a Scotch yoke: weighted error of the rocker function with one harmonic, relative to that "
+            "with the pivot fixed",
             f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
             (
                 *(at_least(f"cam of {name}", ROLLER, c.curvature, "cm") for name, c in cams.items()),
-                at_most("Scotch yoke", 1.0 - ALIKE, one_harmonic / fixed),
+                at_most("secondary linkage", 1.0 - ALIKE, one_harmonic / fixed),
                 Case(label="latch", computed=None, why="no example is given"),
                 Case(
                     label="simple, limited adaptability, complications",
@@ -293,20 +321,24 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
         ),
         Statement(
             "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
-            "overall output and to record simultaneously and separately the values of the inputs.",
+            "overall output and to record simultaneously and separately the values of the inputs. In practice this may be "
+            "accomplished with primary input operating in its normal mode. This establishes inter alia, the necessary cyclic "
+            "variation of the secondary input for reference model purposes, thus eliminating the prior calculation.",
             text("7.1.2, L5346"),
             why="no record is given",
         ),
         Statement(
             "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
             "appropriate mechanical response, which clearly establishes a limit of the range of application.",
-            text("7.1.2, L5360"),
+            text("7.1.2, L5360; for adaptive methods, L5370"),
             why="neither a drive nor a speed is named",
         ),
         Statement(
-            "If the adjustments are made automatically on the basis of a defined error criterion, the mechanism becomes "
-            "self adaptive to its reference, and is thus a self-learning device converging to the desired output.",
-            text("7.1.3, L5382"),
+            "Trial cycles may then be completed in which the adjustable parameters of the drive are progressively changed "
+            "until a satisfactory correspondence is achieved. If the adjustments are made automatically on the basis of a "
+            "defined error criterion, the mechanism becomes self adaptive to its reference, and is thus a self-learning "
+            "device converging to the desired output.",
+            text("7.1.3, L5378-5388"),
             why="neither the adjustment nor the criterion is stated. In our trial cycles (plot) the first "
             f"{HARMONICS[0]} or {HARMONICS[1]} harmonics of the deviation are subtracted from the stored motion: after "
             f"{TRIALS - 1} corrections {left[0]:.0f} or {left[1]:.0f} % of the rms deviation is left",
@@ -320,7 +352,7 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
         Statement(
             'The direct search method, however, may be used "on-line" and accommodate the dynamic '
             "considerations into its structure.",
-            text("7.3.1, L5853"),
+            text("7.3.1, L5853; again L5867"),
             "weighted error of the rocker function over the last turn of a run of the machine with feedback: the least in "
             f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, relative to that with the slider at "
             "rest, where the simplex begins",
@@ -341,9 +373,11 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
         ),
         Statement(
             "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
-            "in an optimum manner, to the changes.",
-            text("7.3.1, L5873-5879"),
-            why="there is no measure of *merely* and *in an optimum manner*; a search on the machine is judged at L5853",
+            "in an optimum manner, to the changes. Thus for automation purposes a heavy swing in favour of the direct search "
+            "method is justified.",
+            text("7.3.1, L5873-5881"),
+            why="there is no measure of *merely*, *in an optimum manner* and *heavy swing*; a search on the machine is judged "
+            "at L5853",
         ),
     )
 
@@ -352,6 +386,7 @@ def judge_strategy() -> tuple[Statement, ...]:
     """Judge the statements on the strategy of search (7.4)."""
     fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
     fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
+    geared, geared_path = (linkage_error(name, with_second_crank(name)) for name in (ROCKER, PATH))
     ratios = ratios_to_least() | {
         "Fig 7.11": linkage_error(ROCKER, readings(ROCKER)[0]) / least,
         "Fig 7.12": linkage_error(PATH, mended_path_linkage()) / least_path,
@@ -362,12 +397,14 @@ def judge_strategy() -> tuple[Statement, ...]:
             "five bar loop.",
             text("7.4, L6013"),
             "error with the slider moved by its best two harmonics, relative to that with the pivot fixed, for the printed "
-            "links, mended",
+            "links, mended. Our example of another link is a second crank, geared to the first (L6017), which moves the rocker "
+            "pivot on a circle about its printed place; we take the best length, phase and gear ratio of 1, -1, 2 and -2",
             SEEN_FALL,
             (
                 at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
                 at_most("slider, Fig 7.12", 1.0 - ALIKE, least_path / fixed_path),
-                Case(label="another link", computed=None, why="no example of another link is given"),
+                at_most("another link, task of Fig 7.11", 1.0 - ALIKE, geared / fixed),
+                at_most("another link, task of Fig 7.12", 1.0 - ALIKE, geared_path / fixed_path),
             ),
         ),
         Statement(

@@ -234,8 +234,8 @@ def compute_friction() -> StudyResult:
         assignment=(
             "The text gives no coefficient and no measured amplitude. With spring A at 390, 420 and 450 rpm, coefficients "
             f"of {ends[0]:.3f} to {ends[1]:.3f} reduce the amplitude by {100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} %, a "
-            "slight variation. Each case takes that end of this range and that speed which are least favourable to the "
-            "sentence."
+            "slight variation, at the speed at which they reduce it most. Each case takes that end of this range and that "
+            "speed which are least favourable to the sentence."
         ),
         columns=pad_columns(columns),
         statements=_friction(ends),

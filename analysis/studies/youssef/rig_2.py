@@ -41,15 +41,16 @@ WIDTH = (
 
 
 def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
-    """Return the greatest ratio, over the speeds (rpm), of the amplitude to that of a single mass under an unbalance (cm.kg).
+    """Return the ratio of the amplitude to that of a single mass under an unbalance (cm.kg), the farthest from 1.
 
-    The single mass is on the same spring and damper.
+    The speeds are in rpm. The single mass is on the same spring and damper.
     """
     rates, amplitudes = (
         RAD_S_PER_RPM * speeds,
         np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()]),
     )
-    return float((amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)).max())
+    ratios = amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)
+    return float(ratios[np.abs(ratios - 1.0).argmax()])
 
 
 def judge_motion() -> tuple[Statement, ...]:
@@ -104,7 +105,8 @@ def judge_motion() -> tuple[Statement, ...]:
             text(f"{section}, L6814; again 8.4.2.2, L6968"),
             "second harmonic relative to the first, as in the sentence before; greatest of the harmonics 3 to 6 relative to "
             f"the greater of the two, the most from {span[0]:g} to {span[1]:g} rpm in steps of 10",
-            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *no evidence* too",
+            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *very small* and "
+            "*no evidence* too",
             tuple(
                 at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
                 for s in "CD"
@@ -140,7 +142,7 @@ def _like_one_mass(
         phase.append(at_most(f"spring {s}, phi", ABOUT_DEG, _phase_range(force), "deg"))
         spread.append(at_most(f"spring {s}, F0 over the square", ABOUT, np.ptp(unbalance) / unbalance.mean()))
         ratio = _unbalance_ratio(s, np.unique([*speeds, *about[s]]), float(unbalance.mean()))
-        beyond.append(at_most(f"spring {s}, amplitude", 1.0 + ABOUT, ratio))
+        beyond.append(near(f"spring {s}, amplitude", 1.0, ratio, ABOUT))
     return (
         Statement(
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
@@ -158,7 +160,7 @@ def _like_one_mass(
             text("8.4.2.2, L6970"),
             "F0 (L6820) divided by the square of the speed: its range relative to its mean. Then the amplitude of the "
             "slider, relative to that of such a system under an unbalance whose force is this mean times the square of the "
-            "speed: the greatest ratio from 300 to 1000 rpm, as at L6808",
+            "speed: the ratio farthest from 1, from 300 to 1000 rpm, as at L6808",
             f"{ABOUT:g}, the rule for *similar*",
             (*spread, *beyond),
             "near half the natural frequency the second harmonic adds to the first",
@@ -336,6 +338,7 @@ def _natural_frequencies() -> tuple[Statement, ...]:
                 *(at_most(f"spring {s}", SMALL, error[s]) for s in "CD"),
                 Case(label="agreement with the experiment", computed=None, why=rigs.LOST),
             ),
+            "that the results support chapter IV (L6887) is said of this, of L6814 and of L6970",
         ),
     )
 
