@@ -255,8 +255,7 @@ def _amplitude_a() -> Statement:
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
         "which it increases with increase of speed.",
         text("8.4.1.2, L6734"),
-        f"amplitude over the speed with spring A, from 240 rpm, the lowest speed of the figures; {NEAREST}, which has one "
-        "digit",
+        f"amplitude over the speed with spring A, from 240 rpm, the lowest speed of the figures; {NEAREST} (one digit)",
         f"{TENS}; 0.5 rpm for 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; for rises the sign alone",
         (
             at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
@@ -354,8 +353,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
             "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
-            f"amplitude over the speed with spring B, from 500 rpm, the lowest speed of the figures; {NEAREST}, which has "
-            "two digits",
+            f"amplitude over the speed with spring B, from 500 rpm, the lowest speed of the figures; {NEAREST} (two "
+            "digits)",
             f"{TENS}; {ALIKE:g}, the rule for *the same*; for rises and falls the sign alone",
             (
                 at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),

@@ -19,7 +19,7 @@ from .conclusions_motion import judge_constant_speed, judge_equations, judge_lau
 from .problems import AREA_N, PROBLEMS
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
-from .series_2 import best_error_ratios, error_ratios, out_of_reach, shares_of_stated
+from .series_2 import best_error_ratios, error_ratios, out_of_reach, path_motion, shares_of_stated
 from .stated_errors import share_of_stated
 
 NUMBER = "conclusions"
@@ -30,15 +30,14 @@ ELLIPSES = {"path (a), 10 cm": 10.0, "12.5 cm": 12.5, "path (b), 15 cm": 15.0}
 def ellipse_error(semi_axis: float) -> float:
     """Return the least area between an ellipse and the coupler curve of path (b)'s links, relative to the ellipse's area.
 
-    ``semi_axis`` is in cm. The rocker pivot moves with five harmonics.
+    ``semi_axis`` is in cm. The rocker pivot moves with five harmonics; one start of the search is the best motion for path (b).
     """
     p = PROBLEMS["path-b"]
     formula = f"0.20 + {semi_axis / CM_PER_METRE:g}*cos(t)"
     task = UntimedPath(path=path_from_formula(formula, "0.15 + 0.05*sin(t)", n=AREA_N))
     unknown = SliderUnknown(harmonics=5, stroke=0.25)
-    return p.convert(slider_motion(task, p.linkage, unknown, search=Search(starts=4)).best.error) / (
-        5.0 * pi * semi_axis
-    )
+    found = slider_motion(task, p.linkage, unknown, guesses=[path_motion(5)], search=Search(starts=1))
+    return p.convert(found.best.error) / (5.0 * pi * semi_axis)
 
 
 def judge_second_input() -> tuple[Statement, ...]:
