@@ -185,8 +185,8 @@ def judge_launches() -> tuple[Statement, ...]:
     runs = [launch(*which) for which in LAUNCHES]
     maxima = [maxima_spacings(run["crank.angle"], run["slider.velocity"]) for run in runs]
     fastest = max(run_peak(run_acceleration(*which)).angle for which in LAUNCHES)
-    slowest = max(LAUNCHES, key=lambda which: decay(*which, DAMPED))
-    first, *_, last = ranges_after(*slowest, DAMPED)
+    torque, stiffness = max(LAUNCHES, key=lambda which: decay(which[0], which[1], DAMPED))
+    first, *_, last = ranges_after(torque, stiffness, DAMPED)
     undamped = min(decay(*which, 0.0) for which in LAUNCHES if which not in FOLDING)
     return (
         Statement(
@@ -222,10 +222,10 @@ def judge_launches() -> tuple[Statement, ...]:
             "links do not become collinear",
             f"with the damper {SEEN_FALL}; without it no such fall",
             (
-                at_most("with the damper, five launches", 1.0 - ALIKE, decay(*slowest, DAMPED)),
+                at_most("with the damper, five launches", 1.0 - ALIKE, decay(torque, stiffness, DAMPED)),
                 at_least("without, three launches", 1.0 - ALIKE, undamped),
             ),
-            f"the slowest decay is that with T0 = {plain(slowest[0])} dyn.cm and k = {plain(slowest[1])} dyn/cm: its range "
+            f"the slowest decay is that with T0 = {plain(torque)} dyn.cm and k = {plain(stiffness)} dyn/cm: its range "
             f"stays the same for ten turns, and is {last / first:.2f} of this in the last",
         ),
     )
