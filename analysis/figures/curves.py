@@ -14,6 +14,7 @@ from typing import Any, ParamSpec
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
@@ -196,6 +197,7 @@ def draw(picture: Picture) -> style.Figure:
     heights = picture.heights or [1.0] * rows
     with style.figure_style():
         figure = style.Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
+        FigureCanvasAgg(figure)  # measures all texts with one renderer, instead of a new one each
         axes = figure.subplots(
             rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
         )

@@ -186,6 +186,8 @@ def place_marks(figure: Figure) -> Figure:
         moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
         if not moved:
             continue
+        for text, _ in moved:
+            text.get_window_extent()  # tells the text where its point is
         scene = _Scene.from_axes(axis)
         placed: dict[Annotation, Bbox] = {}
         leaders: dict[Annotation, Path] = {}
@@ -246,8 +248,7 @@ def _move_label(label: Annotation, distance: float, direction: float) -> Bbox:
     label.set_position((distance * np.cos(direction), distance * np.sin(direction)))
     across = np.cos(direction)
     label.set_horizontalalignment("center" if abs(across) < 0.1 else "left" if across > 0.0 else "right")
-    label.get_window_extent()
-    # the box without the line to the point
+    # the box without the line to the point, whose measurement is slow
     return Text.get_window_extent(label)
 
 
