@@ -47,7 +47,8 @@ MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
 def measure_waiting(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     """Run Python with these arguments; return wall-clock and processor time (s) and the number of announced compilations."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
-    environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
+    # Python keeps the modules that it has compiled, as for any user
+    environment = os.environ | {"LINKWORK_CACHE_DIR": folder, "PYTHONDONTWRITEBYTECODE": ""}
     done = subprocess.run(
         [sys.executable, "-c", *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )
