@@ -26,10 +26,11 @@ from pathlib import Path
 from typing import Any
 
 from llvmlite import binding
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 _HASH = hash(Flags())
@@ -208,9 +209,22 @@ def _read_verified(path: Path) -> bytes:
     return content
 
 
+class _Cache(FunctionCache):
+    """Cache of a dispatcher from which code is read without Numba's types and functions, which only compiling needs.
+
+    They take a third of a second, as Numba also imports the linear algebra of SciPy.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
 def keep(dispatcher: Any, source: Path) -> None:
     """Make Numba keep the machine code of a dispatcher in files with hashes; for ``source`` see `_Files`."""
     dispatcher.enable_caching()
+    dispatcher._cache.__class__ = _Cache
     file = dispatcher._cache._cache_file
     file.__class__ = _Files
     file.source = source

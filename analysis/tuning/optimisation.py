@@ -9,7 +9,6 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from linkwork.errors import LinkworkError
 
@@ -333,6 +332,8 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
 
 def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return m sets of values of the k parameters, spread over the bounds ``low`` and ``high``; shape (m, k)."""
+    from scipy.stats import qmc  # takes half a second
+
     share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
     wide = (low > 0.0) & (high > _WIDE * low)
     base, ratio = np.where(wide, low, 1.0), np.where(wide, high / np.where(wide, low, 1.0), 1.0)
