@@ -308,7 +308,8 @@ class Tolerance:
             raise InputError(f"the tolerance of {self.name} must have either a half width or a standard deviation")
         value = self.half_width if self.half_width is not None else self.standard_deviation
         if value is None or not (isfinite(value) and value > 0.0):
-            raise InputError(f"the tolerance of {self.name} is {value!r}: it must be a finite number greater than zero")
+            found = f"{value!r} {ERRORS[self.name]}".rstrip()
+            raise InputError(f"the tolerance of {self.name} is {found}: it must be a finite number greater than zero")
 
     @property
     def deviation(self) -> float:
