@@ -8,10 +8,23 @@ from pathlib import Path
 
 import click
 
+from linkwork.errors import LinkworkError
+
 from ..files import write_tables, write_text
+from ..files.paths import check_ending
 from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
 from ..probe import probe as probe_fmu
 from . import common
+
+
+def _check_report(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """Check, before the probe begins, that the report can be written and its ending is known (a callback of Click)."""
+    if value is not None:
+        try:
+            check_ending(Path(value), (".md", ".json"))
+        except LinkworkError as error:
+            raise click.BadParameter(str(error)) from None
+    return common.check_place(context, parameter, value)
 
 
 @click.command()
@@ -37,7 +50,7 @@ from . import common
     "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check; can be given several times."
 )
 @click.option(
-    "--out", type=click.Path(dir_okay=False), callback=common.check_place, help="File for the report: .md or .json."
+    "--out", type=click.Path(dir_okay=False), callback=_check_report, help="File for the report: .md or .json."
 )
 @common.force_option
 @click.option("--strict", is_flag=True, help="Fail also on questionable findings.")
@@ -102,7 +115,7 @@ def probe(
 
 def _write(report: Report, path: Path) -> Path:
     """Write the report as Markdown or JSON, according to the ending of the path, and return the path."""
-    if path.suffix != ".md":
+    if path.suffix.lower() != ".md":
         return write_tables(path, report.to_dict())
     return write_text(path, report.to_markdown())
 

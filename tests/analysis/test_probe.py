@@ -214,6 +214,14 @@ def test_the_command_reports_and_replays(fmu, tmp_path, monkeypatch):
     assert run(fmu, "--check", "split", "--strict")[0] == 4
 
 
+def test_an_ending_that_no_report_has_is_refused_before_the_probe(fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr("analysis.cli.probe.probe_fmu", lambda *_, **__: pytest.fail("the FMU was probed"))
+    for name in ("report.txt", "report.toml", "report"):
+        code, output = run(fmu, "--check", "split", "--out", tmp_path / name)
+        assert code == 2
+        assert "must end in .md or .json" in output
+
+
 def until(reached: Callable[[], bool]) -> None:
     end = time.monotonic() + 100.0
     while not reached():
