@@ -10,6 +10,7 @@
    FMUs in Python elsewhere, are in controllers.h. What it prints are names and numbers; us are microseconds. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <limits.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -154,14 +155,22 @@ static void await_time(int64_t due) {
 
 static Times taken, woken;
 
+/* Return the finite number that a whole word is, or 0. */
+static double number(const char *word) {
+    char *end;
+    double value = strtod(word, &end);
+    return *end == '\0' && isfinite(value) ? value : 0.0;
+}
+
 int main(int words, char **word) {
     static char buffer[4096];
     setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
-    long steps = words > 1 ? atol(word[1]) : 0, missed = 0;
-    double rate = words > 2 ? atof(word[2]) : 0.0, step = words > 2 ? 1.0 / rate : COMMUNICATION_STEP;
+    double wanted = words > 1 ? number(word[1]) : 0.0;
+    double rate = words > 2 ? number(word[2]) : 0.0, step = words > 2 ? 1.0 / rate : COMMUNICATION_STEP;
+    long steps = wanted >= 1.0 && wanted < (double)LONG_MAX ? (long)wanted : 0, missed = 0;
     int64_t latest = 0, locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-    if (words > 3 || steps < 1 || (words > 2 && !(rate > 0.0))) {
-        fprintf(stderr, "host STEPS [RATE]: both above 0\n");
+    if (words > 3 || steps < 1 || (double)steps != wanted || (words > 2 && !(rate > 0.0))) {
+        fprintf(stderr, "host STEPS [RATE]: a whole number of steps, and steps a second; both above 0\n");
         return 2;
     }
     begin();

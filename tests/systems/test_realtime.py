@@ -155,7 +155,9 @@ def test_times_and_deadlines(tracking: Path) -> None:
     assert hurried["latest_us"] > 390 * (0.5 * hurried["step_us_median"] - 0.1)
 
 
-@pytest.mark.parametrize("words", [(), ("0",), ("10", "0"), ("10", "-5"), ("many",)])
+@pytest.mark.parametrize(
+    "words", [(), ("0",), ("10", "0"), ("10", "-5"), ("many",), ("12.5",), ("10k",), ("10", "2kHz")]
+)
 def test_wrong_words_are_refused(tracking: Path, words: tuple[str, ...]) -> None:
     done = subprocess.run([tracking, *words], capture_output=True, text=True, check=False)
     assert done.returncode == 2
