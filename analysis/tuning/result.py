@@ -11,7 +11,7 @@ from ..mechanisms import Parameters
 from ..run import parameter_tables
 from ..units import display_text
 from .conditions import FloatArray
-from .survey import MARGINAL, Survey
+from .survey import AT_THE_END, MARGINAL, Region, Survey
 from .wishes import Wish
 
 #: Names of the requirements; a limit is named by its text.
@@ -74,11 +74,11 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
     """Return the state of each requirement of a survey, by name; ``several`` are levels with two stable motions."""
     wish, result = found.wish, {}
     if wish.no_resonance:
-        peaks = [(spot.level, spot.level) for spot in found.peaks]
-        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.range_with_margin)
+        peaks = [(spot.level, spot.level, f"at {wish.say(spot.level)}") for spot in found.peaks]
+        result[RESONANCE] = _interval_reading(wish, peaks, wish.range_with_margin)
     if wish.no_jump:
-        jumps = [(region.low, region.high) for region in found.folds]
-        text = _interval_reading(wish, jumps, "between {}", wish.span)
+        jumps = [(region.low, region.high, f"between {_ends_text(wish, region)}") for region in found.folds]
+        text = _interval_reading(wish, jumps, wish.span)
         if not jumps and several:
             text = Reading(
                 text=f"two stable motions at {wish.say(*several)}",
@@ -113,15 +113,23 @@ def _stability_reading(found: Survey) -> Reading:
     return Reading(text=text, excess=width / wish.size, missed=text)
 
 
-def _interval_reading(
-    wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
-) -> Reading:
-    """Return the state of the requirement that ``span`` overlaps none of ``intervals``; ``words`` describe an interval."""
+def _ends_text(wish: Wish, region: Region) -> str:
+    """Return both ends of a region; an end at which only the branch was not followed further is a bound."""
+    special = [point.parameter for point in (region.first, region.last) if point is not None]
+    low, high = (
+        wish.say(level) + ("" if any(abs(level - end) < AT_THE_END * wish.size for end in special) else bound)
+        for level, bound in ((region.low, " or less"), (region.high, " or more"))
+    )
+    return f"{low} and {high}"
+
+
+def _interval_reading(wish: Wish, intervals: Sequence[tuple[float, float, str]], span: tuple[float, float]) -> Reading:
+    """Return the state of the requirement that ``span`` overlaps none of ``intervals``, each with the words for it."""
     if not intervals:
         return Reading(text="none")
     low, high = span
-    text = ", ".join(words.format(wish.say(a) if a == b else f"{wish.say(a)} and {wish.say(b)}") for a, b in intervals)
-    away = max(min(b - low, high - a) for a, b in intervals)
+    text = ", ".join(words for _, _, words in intervals)
+    away = max(min(b - low, high - a) for a, b, _ in intervals)
     return Reading(text=text, excess=away / wish.size, missed=f"{text}, {wish.say(away)} from the nearer end")
 
 
