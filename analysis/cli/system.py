@@ -44,7 +44,10 @@ _FMI = click.option(
 def _wiring(file: str, fmi: str = "2") -> Wiring:
     from ..systems import load_system, read_ssp
 
-    return read_ssp(file) if Path(file).suffix == ".ssp" else load_system(file).wiring(fmi=int(fmi))
+    if Path(file).suffix == ".ssp":
+        return read_ssp(file)
+    common.check_kind(file, common.SYSTEM)
+    return load_system(file).wiring(fmi=int(fmi))
 
 
 @system.command()

@@ -180,6 +180,13 @@ def test_a_system_given_to_a_command_for_cases_is_named(linkwork: Callable[..., 
     assert "is a system of parts: linkwork system run" in result.stderr
 
 
+@pytest.mark.parametrize("command", ["run", "check", "build", "draw", "host"])
+def test_a_case_given_to_a_command_for_systems_is_named(linkwork: Callable[..., Result], command: str) -> None:
+    result = linkwork("system", command, str(Path(__file__).parents[2] / "examples" / "tuning.toml"))
+    assert result.exit_code == 1
+    assert "is a case of a tuning: linkwork tune" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("name", "count"), [("motor-crank", 1), ("press", 3), ("two-linkages", 3), ("slider-tracking", 0)]
 )
