@@ -1,8 +1,9 @@
 """Sampled controllers as Python FMUs; their outputs are held between two samples.
 
-A sample uses the inputs at its instant; its outputs are available at the end of the communication step. If the step is shorter
-than the sample time, the outputs are therefore delayed by one step. If the step is as long as the sample time, they are delayed
-by one sample, like the outputs of a computer that needs the whole sample time for the calculation.
+A sample uses the inputs of the communication step in which its instant lies, which a master sets at the start of the step; its
+outputs are available at the end of the step. If the step is a fraction of the sample time, the outputs are therefore delayed by
+one step. If the step is as long as the sample time, they are delayed by one sample, like the outputs of a computer that needs
+the whole sample time for the calculation. In a step that is longer, all samples use the same inputs.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ class Row(NamedTuple):
 #: Conditions on a parameter: the words after "it must", and the test of a finite value.
 RULES: dict[str, tuple[str, Callable[[float], bool]]] = {
     "": ("be a finite number", lambda value: True),
-    "positive": ("be greater than zero", lambda value: value > 0.0),
-    "not negative": ("not be negative", lambda value: value >= 0.0),
+    "positive": ("be a finite number greater than zero", lambda value: value > 0.0),
+    "not negative": ("be a finite number and not negative", lambda value: value >= 0.0),
 }
 
 #: Parameter of every controller; it is the only fixed parameter.

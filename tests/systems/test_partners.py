@@ -242,9 +242,14 @@ def test_gains_and_limits_act_from_the_next_sample_on() -> None:
     [
         ("pid", {"sample_time": 0.01}, "sample_time is a fixed parameter"),
         ("pid", {"gain": float("nan")}, "gain is nan: it must be a finite number"),
-        ("pid", {"gain": 3.0, "tracking_time": 0.0}, "tracking_time is 0.0: it must be greater than zero"),
-        ("state-feedback", {"limit": -1.0}, "limit is -1.0: it must not be negative"),
-        ("dc-servo", {"inductance": 0.0}, "inductance is 0.0: it must be greater than zero"),
+        (
+            "pid",
+            {"gain": 3.0, "tracking_time": 0.0},
+            "tracking_time is 0.0: it must be a finite number greater than zero",
+        ),
+        ("state-feedback", {"limit": -1.0}, "limit is -1.0: it must be a finite number and not negative"),
+        ("pid", {"limit": float("inf")}, "limit is inf: it must be a finite number and not negative"),
+        ("dc-servo", {"inductance": 0.0}, "inductance is 0.0: it must be a finite number greater than zero"),
     ],
 )
 def test_what_a_controller_does_not_take_in_a_run(name: str, values: dict[str, float], sentence: str) -> None:
