@@ -5,7 +5,6 @@ from math import pi
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate, variant
 from analysis.linkages import linkage
@@ -23,7 +22,7 @@ from analysis.periodic import (
     special_gradient,
     sweep,
 )
-from analysis.periodic.motion.drive import assembly_ranges, fill_cube, spread_starts
+from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.assembly import check_assembly
@@ -48,19 +47,6 @@ def test_one_motion_is_found_where_all_of_them_are() -> None:
     parameters, drive = replace(RIG_1_B, slider_damping=2.0), Drive(speed=1031.5 * RAD_S_PER_RPM)
     (only,) = find_orbits(parameters, speed=drive.speed)
     assert newton_orbit(parameters, drive).start == pytest.approx(only.start, rel=1e-8)
-
-
-@pytest.mark.parametrize("size", [2, 3, 5, 9])
-def test_points_in_a_cube_are_nearly_as_even_as_sobol_points(size: int) -> None:
-    """By the mean centred discrepancy of twenty sets; for random points it is 2 to 40 times that of Sobol points."""
-    filled, sobol = (
-        np.mean([qmc.discrepancy(points) for points in sets])
-        for sets in (
-            [fill_cube(size, 64, [seed]) for seed in range(20)],
-            [qmc.Sobol(size, rng=seed).random(64) for seed in range(20)],
-        )
-    )
-    assert filled < 1.9 * sobol
 
 
 def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:

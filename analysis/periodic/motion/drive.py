@@ -691,21 +691,6 @@ def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
 
-def fill_cube(size: int, count: int, seed: Sequence[int]) -> NDArray[np.float64]:
-    """Return points that are spread evenly over a unit cube, shape (count, size): Hammersley's set, shifted at random.
-
-    Point i has the coordinates i / count and, in the base of each of the first primes, i with its digits mirrored at the point.
-    The Sobol points of `scipy.stats` are a little more even, but their import takes half a second.
-    """
-    i = np.arange(count)
-    primes = [b for b in range(2, 100) if all(b % n for n in range(2, b))]
-    mirrored = [sum(i // b**k % b / b ** (k + 1) for k in range(count.bit_length())) for b in primes[: size - 1]]
-    filled: NDArray[np.float64] = (
-        np.column_stack([i / count, *mirrored]) + np.random.default_rng(seed).random(size)
-    ) % 1.0
-    return filled
-
-
 def spread_starts(
     parameters: Parameters,
     drive: Drive,
@@ -714,7 +699,7 @@ def spread_starts(
     number: int = 0,
     ranges: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Return starts with many amplitudes and phases, by a quasi-random sequence; shape (3/2 count or 5/2 count, n).
+    """Return starts with many amplitudes and phases, by a scrambled Sobol sequence; shape (3/2 count or 5/2 count, n).
 
     In the plane of a coordinate and its rate the starts fill the largest ellipse about the default initial value for which the
     links can be joined. Half as many further starts have amplitudes that are spread evenly over the logarithm, because the
@@ -726,12 +711,14 @@ def spread_starts(
     guess : ndarray, shape (n,)
         First guess of y; under a torque the crank speeds of the starts lie around the crank speed in ``guess``.
     count : int
-        Number of starts in an ellipse.
+        Number of starts in an ellipse, a power of two.
     number : int
         Index of the set of starts, which is the seed of the sequence: each index gives other starts.
     ranges : tuple of ndarray, optional
         Result of `start_ranges`, for callers that take several sets.
     """
+    from scipy.stats import qmc  # takes half a second
+
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
     rest = flow.rest[:half]
@@ -739,7 +726,9 @@ def spread_starts(
     around = mean_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
     own = np.minimum(rest - low, high - rest)
-    filled, further = fill_cube(flow.size, count, [number]), fill_cube(flow.size, count // 2, [number, 1])
+    filled, further = (
+        qmc.Sobol(flow.size, rng=seed).random(n) for seed, n in ((number, count), ([number, 1], count // 2))
+    )
     further[:, :half] = _DEPTH ** -further[:, :half]
     ellipses = [(rest, own, filled), (rest, own, further)]
     if (np.maximum(rest - low, high - rest) > _ONE_SIDED * own).any():
