@@ -6,7 +6,6 @@ evenly spaced positions of a turn, finds the equilibrium of all free coordinates
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -194,6 +193,8 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int
 
 
 def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:
+    from scipy.optimize import linear_sum_assignment
+
     values, vectors = np.linalg.eig(matrices.A)
     size, shape = matrices.M.shape[-1], matrices.M.shape[:2]
     frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
@@ -207,7 +208,7 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
         products = np.outer((known.conj() * (mass @ known)).real.sum(axis=0), energies.sum(axis=0))
         likeness = np.full(products.shape, _NEW)
         np.divide(np.abs(known.conj().T @ mass @ shapes) ** 2, products, out=likeness, where=products > 0.0)
-        for k, own in _match(likeness):
+        for k, own in zip(*linear_sum_assignment(likeness, maximize=True)):
             pole, known[:, k] = poles[oscillating[own]], shapes[:, own]
             shares[j, k] = energies[:, own] / energies[:, own].sum()
             frequencies[j, k], ratios[j, k] = abs(pole), -pole.real / abs(pole)
@@ -221,12 +222,3 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
         damping_ratios=ratios[:, found],
         shares=np.nanmean(shares[:, found], axis=0),
     )
-
-
-def _match(likeness: FloatArray) -> Iterable[tuple[int, int]]:
-    """Return the pairs of a row and a column with the greatest sum of likenesses."""
-    if likeness.size == 1:
-        return [(0, 0)]
-    from scipy.optimize import linear_sum_assignment  # takes a third of a second
-
-    return zip(*linear_sum_assignment(likeness, maximize=True))

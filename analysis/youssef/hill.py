@@ -215,9 +215,8 @@ def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
 
     Entry (n, k) is coefficient n - k of the series; the shape is (size, size).
     """
-    n = np.arange(size)
-    coefficients: NDArray[np.complex128] = series.to_order(size).exponential
-    return coefficients[size + n[:, None] - n]
+    coefficients = series.to_order(size).exponential[size:]
+    return np.asarray(scipy.linalg.toeplitz(coefficients[:size], coefficients[:size].conj()))
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
