@@ -24,8 +24,8 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 
 from analysis.numerics.tracing import rebind_functions
 from analysis.synthesis.linkage.linkage import Linkage
-from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.start import Answer, Start
+from analysis.synthesis.search.fit import sum_of_squares
+from analysis.synthesis.search.program import Answer, Start
 from analysis.synthesis.task.constraint import TURNING
 from analysis.synthesis.task.limits import Limits
 from analysis.synthesis.task.task import Normal

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from analysis.numerics.overlap import symmetric_difference
 from analysis.studies.youssef.problems import AREA_N, N
 from analysis.synthesis import Linkage, evaluate, normal_form, turn
-from analysis.synthesis.search.start import make_linkage
+from analysis.synthesis.search.program import make_linkage
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
 

@@ -28,8 +28,8 @@ from threadpoolctl import threadpool_limits
 from analysis.numerics.overlap import find_nearest, symmetric_difference
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path
-from analysis.synthesis.search.refine import cut_into_pieces
-from analysis.synthesis.search.start import make_linkage
+from analysis.synthesis.search.fit import cut_into_pieces
+from analysis.synthesis.search.program import make_linkage
 from analysis.synthesis.task.constraint import USUAL, Constraint
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal

@@ -28,7 +28,7 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from analysis.synthesis import InfeasibleError, Search, synthesize
-from analysis.synthesis.search.start import make_start
+from analysis.synthesis.search.program import make_start
 
 from . import tables
 from .black_box import BlackBox

@@ -32,9 +32,10 @@ from analysis.numerics.tracing import rebind_functions
 from analysis.studies.youssef.problems import PROBLEMS, WEIGHT, N, ellipse
 from analysis.synthesis import LargestLink, Linkage, Search, TimedPath, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path, coupler_path_jacobian
-from analysis.synthesis.search.polish import Polisher, fit_least_squares, sum_of_squares
+from analysis.synthesis.search.fit import fit_least_squares, sum_of_squares
+from analysis.synthesis.search.polish import Polisher
+from analysis.synthesis.search.program import Start, make_linkage, make_start
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import Start, make_linkage, make_start
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics

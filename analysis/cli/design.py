@@ -128,10 +128,11 @@ def write_description_files(
 def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: MachineSpec) -> list[Path]:
     """Write the first linkage, and all others that have no defect, as case files for runs; return the paths."""
     from ..files import write_tables
+    from ..synthesis import described_case
 
     names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
     return [
-        write_tables(folder / name, s.described_case(make, title), head=make.describe_masses())
+        write_tables(folder / name, described_case(s, make, title), head=make.describe_masses())
         for s, name in names
         if s is solutions[0] or s.verdicts.sound
     ]
@@ -144,7 +145,7 @@ def write_solution(
     from .. import figures
     from ..files import save_drawing, save_figure, write_tables
     from ..run import save_parameters
-    from ..synthesis import plates
+    from ..synthesis import plates, run_case
 
     written = write_description_files(best, folder, title, curve="best-curve", text="best-report", drawn="best")
     solution = best.solution
@@ -155,7 +156,7 @@ def write_solution(
         )
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
-        written.append(write_tables(case, solution.run_case(make, title), head=make.describe_masses()))
+        written.append(write_tables(case, run_case(solution, make, title), head=make.describe_masses()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     written += common.save_plot(plot, solution, folder / "best-linkage.png", title=title)
@@ -178,7 +179,7 @@ def _forces(solution: Solution, make: MachineSpec) -> PinForces | None:
 
     if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
         return None
-    return pin_forces(solution.linkage, make, solution.rotation_range, run=False)
+    return pin_forces(solution.linkage, make, solution.rotation_range)
 
 
 @click.command()
@@ -217,6 +218,7 @@ def synthesize(
         alternatives,
         assess,
         crowded_plates,
+        format_short,
         has_cognates,
         load_synthesis_case,
         solution_columns,
@@ -250,8 +252,8 @@ def synthesize(
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += common.save_plot(plot, result, folder / "alternatives.png", title=chosen.title)
     common.print_paths(written)
-    if best.poor:
-        common.print_error(f"note: {best.poor}")
+    for note in filter(None, (best.poor, format_short(best.solution))):
+        common.print_error(f"note: {note}")
     if crowded := crowded_plates(result.best, chosen.make.hole):
         common.print_error(
             f"note: in the plates, holes of {1e3 * chosen.make.hole:g} mm overlap in {' and '.join(crowded)}: smaller make.pin "

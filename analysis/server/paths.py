@@ -134,7 +134,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 
 def _state(solution: syn.Solution, title: str) -> Answer:
-    case = read_case(solution.run_case(syn.MachineSpec(), title), folder=Path(), title=title)
+    case = read_case(syn.run_case(solution, syn.MachineSpec(), title), folder=Path(), title=title)
     state, speed = page_state(case), default_variable(find_mechanism(case.parameters))
     # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 import analysis.synthesis as syn
-from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.start import make_start
+from analysis.synthesis.search.fit import sum_of_squares
+from analysis.synthesis.search.program import make_start
 from analysis.synthesis.task.limits import make_limits
 from benchmarks.black_box import BlackBox, initial_simplex
 from tests.linkages import drawn, ellipse

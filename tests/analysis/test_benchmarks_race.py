@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import Linkage, turn
-from analysis.synthesis.search.start import make_start
+from analysis.synthesis.search.program import make_start
 from benchmarks import contest as shared
 from benchmarks import race
 from benchmarks.contest import Contest, PlacedFourBar, PylinkageScore, TimeUp, Trace, run_search

@@ -22,6 +22,7 @@ from analysis.synthesis import (
     Solution,
     SynthesisInterrupted,
     TimedPath,
+    described_case,
     evaluate,
     synthesize,
     turn,
@@ -134,7 +135,7 @@ def test_a_pivot_that_is_set_and_kept_is_held_in_the_described_linkage(tmp_path)
     solution = Solution.from_linkage(
         chosen.synthesis.task, BASE.with_pivot(SliderMotion(FourierSeries.constant(0.01), 0.4))
     )
-    own = read_case(solution.described_case(chosen.machine(solution), "held"), folder=tmp_path)
+    own = read_case(described_case(solution, chosen.machine(solution), "held"), folder=tmp_path)
     run = simulate(own.parameters, own.inputs, initial=own.initial, stop_time=0.2)
     assert run["pivot.position"] == pytest.approx(np.full(len(run), 0.01), abs=1e-15)
 

@@ -18,9 +18,10 @@ from analysis.files import entry_names
 from analysis.numerics.symbolic import library
 from analysis.run import Inputs, load_case, load_parameters, read_case, simulate
 from analysis.synthesis.case import case as cases
+from analysis.synthesis.case.case import requirement
 from analysis.synthesis.case.tables import KINDS
+from analysis.synthesis.search.statement import trace_requirement
 from analysis.synthesis.task.constraint import UNKNOWNS
-from analysis.synthesis.task.formula import requirement, trace_requirement
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 ROOT = Path(__file__).parents[2]
@@ -148,7 +149,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     task = syn.Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
     solution = syn.Solution.from_linkage(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = read_case(solution.run_case(syn.MachineSpec(speed=3.0), "swing"), folder=tmp_path)
+    ran = read_case(syn.run_case(solution, syn.MachineSpec(speed=3.0), "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -165,7 +166,7 @@ def test_a_slider_that_does_not_settle_starts_at_its_zero() -> None:
         ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2, point_distance=0.1
     )
     solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(12)) + 1e-3), linkage)
-    made = solution.run_case(syn.MachineSpec(slider_stiffness=2000.0, slider_damping=0.0), "undamped")
+    made = syn.run_case(solution, syn.MachineSpec(slider_stiffness=2000.0, slider_damping=0.0), "undamped")
     assert (made["initial"]["slider_position"], made["initial"]["slider_velocity"]) == ("0.0 m", "0.0 m/s")
 
 
@@ -181,7 +182,7 @@ def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, 
     solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(at) + 1e-3, rotation=at), linkage)
     make = syn.MachineSpec(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
     runs = []
-    for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
+    for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other")):
         ran = read_case(tables, folder=tmp_path)
         runs.append(simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.8, step=0.01))
     # of the other file a stiff spring holds the rocker's pivot, which starts in its steady motion
@@ -198,7 +199,7 @@ def test_both_files_of_a_slider_crank_have_the_same_spring_damper_and_friction(t
     make = syn.MachineSpec(speed=15.0, slider_damping=40.0, slider_coulomb_friction=3.0, **spring)
     solution = syn.Solution.from_linkage(task, crank)
     torques = []
-    for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
+    for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other")):
         ran = read_case(tables, folder=tmp_path)
         run = simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.4, step=0.02)
         torques.append(run["drive.applied_torque"])
@@ -575,7 +576,6 @@ def test_a_requirement_is_the_difference_of_its_sides(text, difference) -> None:
         "9**9**9 <= crank_length",
         "crank_length <= 10**300 * 10**300",
         "crank_length <= " + "9" * 5000,
-        "-" * 900 + "1 <= crank_length",
         "(" * 900 + "1" + ")" * 900 + " <= crank_length",
     ],
 )  # fmt: skip

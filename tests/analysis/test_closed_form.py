@@ -196,8 +196,8 @@ def test_rotations_beyond_the_swing_of_a_crank_are_a_branch_defect() -> None:
     at = np.radians([0.0, 30.0, 220.0])
     angle = np.concatenate([linkage.rocker_angle(one) for one in at[:, None]])
     task = syn.RockerFunction(angle=angle, rotation=at)
-    (solution,) = syn.function_generators(task, crank_phase="60 deg", ground_length=1.0).solutions
-    assert solution.linkage.rocker_length == pytest.approx(0.75)
+    (solution,) = syn.function_generators(task, crank_phase="60 deg").solutions
+    assert solution.linkage.rocker_length == pytest.approx(0.075)
     assert solution.verdicts.grashof == "triple-rocker"
     assert solution.verdicts.defects == ("branch defect",)
 

@@ -26,7 +26,7 @@ from analysis.files import (
     to_svg,
 )  # fmt: skip
 from analysis.files.drawings import UNITS
-from analysis.synthesis.result.drawing import LAYERS
+from analysis.synthesis.result.output import LAYERS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from tests.scripts import called
 

@@ -25,7 +25,7 @@ from analysis.probe import probe
 from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, read_case, simulate, simulate_many
 from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
-from analysis.synthesis.linkage.machine import description, drives
+from analysis.synthesis.result.output import description, drives
 from linkwork.errors import InputError, LinkworkError
 from linkwork.limits import LIMIT_SINE, MASSLESS
 from linkwork.mechanism import Mechanism

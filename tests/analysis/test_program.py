@@ -13,10 +13,10 @@ from scipy.optimize import nnls
 
 import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis.search.polish import fit_least_squares, polish, residuals, sum_of_squares
-from analysis.synthesis.search.program import Program
+from analysis.synthesis.search.fit import fit_least_squares, residuals, sum_of_squares
+from analysis.synthesis.search.polish import polish
+from analysis.synthesis.search.program import Program, Start, make_linkage, make_start
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import Start, make_linkage, make_start
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.errors import InputError, ParameterError
@@ -257,13 +257,9 @@ class TestConstraints:
 
     def test_required_inequality_in_functions_of_math(self) -> None:
         # the height of D above A
-        height = syn.Require(function=lambda p: 0.1 - p.ground_length * math.sin(p.ground_angle), name="height of D")
+        height = syn.Require(function=lambda p: 0.1 - p.ground_length * np.sin(p.ground_angle), name="height of D")
         solution = best(*syn.USUAL, SMALL, height)
         assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
-        from math import sin
-
-        again = syn.Require(function=lambda p: 0.1 - p.ground_length * sin(p.ground_angle))
-        assert best(*syn.USUAL, SMALL, again).linkage.values() == solution.linkage.values()
 
     def test_required_equality_in_functions_of_numpy(self) -> None:
         # the coupler point on the coupler's own line, in SI and absolute places
@@ -274,9 +270,9 @@ class TestConstraints:
         assert solution.linkage.pivot_x - solution.linkage.pivot_y == pytest.approx(0.3, abs=1e-7)
 
     def test_functions_that_casadi_names_otherwise(self) -> None:
-        in_degrees = syn.Require(function=lambda p: math.degrees(p.ground_angle) - 100.0, equal=True, scale=100.0)
+        in_degrees = syn.Require(function=lambda p: np.degrees(p.ground_angle) - 100.0, equal=True, scale=100.0)
         longest = syn.Require(
-            function=lambda p: np.maximum(math.pow(p.coupler_length, 2.0), p.rocker_length**2) - 0.0225, scale=0.01
+            function=lambda p: np.maximum(np.power(p.coupler_length, 2.0), p.rocker_length**2) - 0.0225, scale=0.01
         )
         solution = best(*syn.USUAL, SMALL, in_degrees, longest).linkage
         assert math.degrees(solution.ground_angle) == pytest.approx(100.0, abs=1e-4)
@@ -293,13 +289,13 @@ class TestConstraints:
     def test_what_loses_the_symbol_is_refused_by_name(self) -> None:
         # float() of a symbol is NaN, and so would the constraint be
         branching = lambda p: p.pivot_x if p.pivot_x > 0 else 0.0  # noqa: E731
-        losing = (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.gamma(p.crank_length))
+        losing = (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.sin(p.crank_length))
         for function in (branching, *losing):
             with pytest.raises(InputError, match="my rule cannot be traced"):
                 best(*syn.USUAL, syn.Require(function=function, name="my rule"))
 
     def test_what_cannot_be_is_said_by_name(self) -> None:
-        impossible = syn.Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")
+        impossible = syn.Require(function=lambda p: 2.0 - np.cos(p.point_angle), name="a cosine of two")
         with pytest.raises(syn.InfeasibleError, match=r"searches the nearest violates the a cosine of two by 1"):
             best(*syn.USUAL, impossible)
 
@@ -309,11 +305,9 @@ class TestWeights:
         plain = best(*syn.USUAL, syn.LargestLink(length=0.2))
         weights = np.ones(24)
         weights[7] = 1000.0
-        heavy = best(*syn.USUAL, syn.LargestLink(length=0.2), weights=weights)
+        heavy = best(*syn.USUAL, syn.LargestLink(length=0.2), task=syn.TimedPath(points=ellipse(24), weights=weights))
         assert heavy.evaluation.errors[7] < 0.2 * plain.evaluation.errors[7]
         assert heavy.error == pytest.approx(float(weights @ heavy.evaluation.errors**2))
-        same = best(*syn.USUAL, syn.LargestLink(length=0.2), task=syn.TimedPath(points=ellipse(24), weights=weights))
-        assert same.error == heavy.error
 
     def test_a_weight_of_zero_leaves_a_point_out(self) -> None:
         points = ellipse(24)
@@ -526,7 +520,6 @@ class TestBadUnknowns:
             (lambda: syn.SliderUnknown(harmonics=-1), "harmonics is -1"),
             (lambda: syn.SliderUnknown(harmonics=1, guide_angle=(1.0, 0.0)), "bounds of guide_angle"),
             (lambda: syn.SliderUnknown(harmonics=1, stroke=0.0), "greatest stroke is 0.0"),
-            (lambda: syn.SliderUnknown(harmonics=1, smoothness=-1.0), "smoothness is -1.0"),
             (lambda: syn.CrankUnknown(ratio=1, length=(0.2, 0.1)), "bounds of the second crank"),
             (lambda: syn.LeastTransmission(angle=2.0), "least transmission angle is 2.0"),
             (lambda: syn.LeastTransmission(over="way"), "over is 'way'"),

@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 import analysis.synthesis as syn
-from analysis.synthesis.search.polish import sum_of_squares
+from analysis.synthesis.search.fit import sum_of_squares
+from analysis.synthesis.search.program import make_linkage
 from analysis.synthesis.search.scan import (
     SHAPES,
     Candidates,
@@ -18,7 +19,6 @@ from analysis.synthesis.search.scan import (
     _place_timed,
     scan,
 )
-from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
 
@@ -43,7 +43,7 @@ def shape(linkage: syn.Linkage, *, phase: float = 0.0, distance: float = 0.0, di
 
 def first(candidates: Candidates, normal: Normal) -> syn.Linkage:
     """The first candidate's linkage."""
-    from analysis.synthesis.search.start import Start
+    from analysis.synthesis.search.program import Start
 
     return make_linkage(Start(q=candidates.q[0], branch=candidates.branch), normal)
 

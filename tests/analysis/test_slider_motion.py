@@ -32,13 +32,12 @@ from analysis.synthesis import (
     UntimedPath,
     evaluate,
     normal_form,
-    sensitivities,
     synthesize,
     turn,
 )
 from analysis.synthesis.linkage.kernels import link_directions
-from analysis.synthesis.search.program import Program
-from analysis.synthesis.search.start import make_linkage, make_start, random_pivot
+from analysis.synthesis.result.report import displacements
+from analysis.synthesis.search.program import Program, make_linkage, make_start, random_pivot
 from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
@@ -82,7 +81,7 @@ def test_series_2_with_two_harmonics() -> None:
     # fitted at more stations than the task has, and told at the task's
     assert len(found.best.rotation) == 360
     assert len(found.best.evaluation.rotation) == PATH_B.task.samples
-    residual = {s.name: s.shift for s in sensitivities(found.best)}
+    residual = displacements(found.best)
     assert residual["pivot_x"] < 1.0
     assert residual["slider cos 1"] > 0.0
 
@@ -365,15 +364,6 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
         slider_motion(task, four_bar.linkage, SliderUnknown(harmonics=1), search=Search(starts=2))
 
 
-# Smoothness
-
-
-def test_smoothness_as_a_weight_does_the_same() -> None:
-    rough, smooth = moved(2), moved(2, smoothness=1.0)
-    assert smooth.best.error > rough.best.error
-    assert greatest_derivative(smooth.best.linkage, 2) < greatest_derivative(rough.best.linkage, 2)
-
-
 # Manners
 
 
@@ -410,7 +400,6 @@ def test_what_cannot_be_joined_is_infeasible() -> None:
         ({"harmonics": 1, "guide_angle": (1.0, 0.0)}, "guide_angle"),
         ({"harmonics": 1, "guide_angle": (0.0, float("inf"))}, "guide_angle"),
         ({"harmonics": 1, "position": (0.1, 0.1)}, "slider position"),
-        ({"harmonics": 1, "smoothness": float("nan")}, "smoothness"),
     ],
 )
 def test_an_unknown_motion_is_checked(options: dict[str, object], words: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 import analysis.synthesis as syn
 from analysis.synthesis.result.solution import group_similar
 from analysis.synthesis.search.polish import distinct_answers
-from analysis.synthesis.search.start import Answer, make_start
+from analysis.synthesis.search.program import Answer, make_start
 from analysis.synthesis.task.task import normal_form
 
 SIZES = {"pivot_x": 0.1, "pivot_y": 0.05, "crank_length": 0.05, "coupler_length": 0.16, "point_distance": 0.09}

@@ -18,7 +18,7 @@ from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
 from analysis.files.drawings import Polyline
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis.result.drawing import LAYERS, rounded_hull
+from analysis.synthesis.result.output import LAYERS, rounded_hull
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
@@ -418,7 +418,7 @@ def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
 
 def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
     solution = timed()
-    forces = syn.pin_forces(solution.linkage, syn.MachineSpec(speed=6.0), run=False)
+    forces = syn.pin_forces(solution.linkage, syn.MachineSpec(speed=6.0))
     figure = figures.plot_sheet(solution, forces, title="sheet", made="bars")
     assert tuple(figure.get_size_inches() * 25.4) == pytest.approx((297.0, 210.0))
     panel = axis_of(figure, "pin force")

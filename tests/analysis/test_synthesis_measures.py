@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +18,9 @@ import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.numerics.overlap import symmetric_difference
 from analysis.slider import slider_motion
+from analysis.synthesis.search.fit import Refinement, _Descent
 from analysis.synthesis.search.polish import worst_violation
-from analysis.synthesis.search.program import Program
-from analysis.synthesis.search.refine import Refinement, _Descent
-from analysis.synthesis.search.start import make_start
+from analysis.synthesis.search.program import Program, make_start
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.target import even_odd_area
 from analysis.synthesis.task.task import Measure, Objective
@@ -188,7 +188,8 @@ def traced(name: str, measure: Measure = "area") -> syn.Solution:
 
 def best_circle(path: syn.TargetPath) -> float:
     """Least area between a path and a circle about its middle or its centroid."""
-    centres = (path.centroid, 0.5 * (path.points.min(axis=0) + path.points.max(axis=0)))
+    middle = np.ravel(shapely.LinearRing(path.points).centroid.xy)
+    centres = (middle, 0.5 * (path.points.min(axis=0) + path.points.max(axis=0)))
     size = float(np.hypot(*np.ptp(path.points, axis=0)))
     return min(
         syn.area_difference(circle(radius, centre).path(syn.turn(360)), path)

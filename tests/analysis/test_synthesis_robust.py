@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import analysis.synthesis as syn
-from analysis.synthesis.task.formula import formula
+from analysis.synthesis.task.target import formula
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]

@@ -80,9 +80,9 @@ def test_the_straightest_travel_of_the_printed_packaging_machine() -> None:
             x, y = curve[np.arange(start, start + steps + 1) % 72].T
             if abs(x[-1] - x[0]) >= TRAVEL_CM:
                 least = min(least, np.ptp(y) / abs(x[-1] - x[0]))
-    part, count = straightest(curve / 100.0)
+    part = straightest(curve / 100.0)
     assert part.flatness / part.travel == pytest.approx(least, rel=1e-9)
-    assert 5 * (count - 1) < 120
+    assert 5 * part.steps < 120
 
 
 def test_error_over_the_rounding_of_printed_digits() -> None:

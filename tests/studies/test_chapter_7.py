@@ -24,7 +24,7 @@ from analysis.studies.youssef.series_2 import (
     rocker_motion,
     slider,
 )
-from analysis.synthesis import Linkage, SecondCrank, SliderMotion
+from analysis.synthesis import Linkage, MachineSpec, SecondCrank, SliderMotion
 from analysis.youssef import accessible_area
 from linkwork.five_bar import kinematics
 
@@ -95,7 +95,7 @@ ROCKER_BEST = {1: 2.334, 2: 0.7221, 3: 0.4896}
 def by_the_plant(linkage: Linkage, phi: float, u: float, guide: float) -> tuple[complex, float]:
     """P in the plane (m) and the rocker's angle (rad), by `linkwork.five_bar.kinematics` alone."""
     fixed = replace(linkage, pivot=SliderMotion(slider(linkage).series, guide) if linkage.pivot else None)
-    p = replace(fixed.to_five_bar(), slider_guide_angle=guide).constants()
+    p = replace(MachineSpec().sliding_five_bar(fixed), slider_guide_angle=guide).constants()
     g = kinematics.position(phi + linkage.crank_phase, u, p)
     place = complex(linkage.pivot_x, linkage.pivot_y)
     turned = complex(cos(linkage.ground_angle), sin(linkage.ground_angle))
@@ -240,7 +240,7 @@ class TestSeries1:
 
     def test_area_that_is_reached(self) -> None:
         """Against random configurations, and a sum over small squares by the kinematics of the point."""
-        area = accessible_area(chapter_7.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
+        area = accessible_area(MachineSpec().sliding_five_bar(chapter_7.LINKAGE), (-0.4, 0.4), tolerance=1e-4)
         random = np.random.default_rng(72)
         z = chapter_7.coupler_point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
         rings = np.concatenate([*area.outer, *area.holes]) @ np.array([1.0, 1j])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...synthesis import Linkage, SliderMotion
+from ...synthesis import Linkage, MachineSpec, SliderMotion
 from ...youssef import AccessibleArea, accessible_area
 from ..rules import READ
 from ..statements import Statement, at_least, at_most, near, text
@@ -180,7 +180,7 @@ def family() -> StudyResult:
 @cache
 def reached_area(low: float, high: float) -> AccessibleArea:
     """Return the area that P reaches with U between two limits."""
-    return accessible_area(LINKAGE.to_five_bar(), (low - 1.0, high - 1.0), tolerance=1e-4)
+    return accessible_area(MachineSpec().sliding_five_bar(LINKAGE), (low - 1.0, high - 1.0), tolerance=1e-4)
 
 
 def enclosed_area(low: float, high: float) -> float:

@@ -28,7 +28,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...linear import Design, design_pid, linearise_orbit
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
-from ...synthesis import Linkage, SecondCrank, turn
+from ...synthesis import Linkage, MachineSpec, SecondCrank, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, READ, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
@@ -76,7 +76,7 @@ def machine() -> Machine:
     linkage = rocker_motion(2).linkage
     motion = motion_of_plant(linkage)
     model = replace(
-        linkage.to_five_bar(slider_damping=DAMPING, slider_coulomb_friction=FRICTION),
+        MachineSpec(slider_damping=DAMPING, slider_coulomb_friction=FRICTION).sliding_five_bar(linkage),
         coupler_point_distance=linkage.coupler_length,
     )
     plant = replace(

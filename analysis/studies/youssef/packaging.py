@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
 from ...figures import Curve, Figure, Panel, plot_curves
-from ...synthesis import Straightness, straight_parts, turn
+from ...synthesis import straightness, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_most, text
@@ -25,22 +26,35 @@ NUMBER = "6.11"
 TRAVEL_CM = 154.0
 
 
-def straightest(curve: FloatArray) -> tuple[Straightness, int]:
-    """Return the part of a curve of N points (m) with the least flatness error per length, and the number of points in it.
+class Part(NamedTuple):
+    """A part of a curve: travel and flatness along the x axis (m), index of its first point, and number of steps."""
+
+    travel: float
+    flatness: float
+    start: int
+    steps: int
+
+
+def straightest(curve: FloatArray) -> Part:
+    """Return the part of a closed curve of N points (m) with the least flatness error per length.
 
     The parts compared lie within 120 degrees of crank rotation and are at least as long as the travel AB, along the line.
     """
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
-    parts = ((part, count) for count in range(2, greatest + 1) for part in straight_parts(curve, count, direction=0.0))
-    long_enough = (found for found in parts if CM_PER_METRE * found[0].travel >= TRAVEL_CM)
-    return min(long_enough, key=lambda found: found[0].flatness / found[0].travel)
+    laid = np.vstack([curve, curve[:greatest]])
+    parts = (
+        Part(*straightness(laid[start : start + count], 0.0), start, count - 1)
+        for count in range(2, greatest + 1)
+        for start in range(len(curve))
+    )
+    return min((part for part in parts if CM_PER_METRE * part.travel >= TRAVEL_CM), key=lambda p: p.flatness / p.travel)
 
 
 def compute() -> StudyResult:
     """Compute the curves and the straight parts of both linkages, and judge the statements."""
     p, ours = PROBLEMS["packaging"], best("packaging")
-    printed, count = straightest(p.linkage.path(turn(N)))
-    rotation = 2.0 * pi * (count - 1) / N
+    printed = straightest(p.linkage.path(turn(N)))
+    rotation = 2.0 * pi * printed.steps / N
     part = ours.straight()
     assert part is not None
     columns = path_columns("packaging")

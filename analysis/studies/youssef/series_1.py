@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.fourier import FourierSeries
 from ...slider import VariationalMotion, slider_motion, variational_motion
-from ...synthesis import Search, SliderUnknown, Solution, TimedPath, turn
+from ...synthesis import MachineSpec, Search, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
@@ -123,7 +123,9 @@ def solve_slider_equations(rotation: FloatArray, target: ComplexArray) -> tuple[
 def curve_wanted() -> StudyResult:
     """Compute Fig 7.4: the desired curve, and whether P can reach its points."""
     z = desired_points()
-    reached = accessible(LINKAGE.to_five_bar(), (FAMILY[0] - 1.0 - 1e-9, FAMILY[-1] - 1.0 + 1e-9), z.real, z.imag)
+    reached = accessible(
+        MachineSpec().sliding_five_bar(LINKAGE), (FAMILY[0] - 1.0 - 1e-9, FAMILY[-1] - 1.0 + 1e-9), z.real, z.imag
+    )
     columns = {"crank rotation [deg]": np.degrees(ROTATION), **xy("desired", z)}
     for u in (FAMILY[0], FAMILY[-1]):
         columns |= xy(f"U = {u:g}", coupler_point(TURN, u - 1.0))

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import ParameterError
+from linkwork.errors import InputError, ParameterError
 
 from ... import files
+from ...numerics import symbolic
 from ...units import quantity
-from ..exact.quick_return import QuickReturn, QuickSwing
+from ..exact.generation import QuickReturn, QuickSwing
 from ..linkage import ANGLES, PINS, Kind, MachineSpec, PinForces, pin_forces
 from ..result.solution import Solution
-from ..search.polish import worst_violation
+from ..search.polish import Search, worst_violation
 from ..search.solve import OVER, Synthesis, TradeOff, check_arguments, synthesize, trade_off
-from ..search.start import Search
 from ..task import constraint
-from ..task.formula import requirement
-from ..task.limit_position import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
+from ..task.constraint import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
 from ..task.limits import GEARS, limits_by_kind
+from ..task.target import evaluate_expression, parse_expression
 from ..task.task import Task, normal_form
 from .tables import read_plane_points, read_task
 
@@ -55,6 +58,51 @@ class SearchTable:
         """Return the `Search` that the table describes, with the fields in ``changes`` replaced."""
         own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
+
+
+_COMPARISONS: Mapping[type[ast.cmpop], tuple[int, bool]] = {
+    ast.LtE: (1, False),
+    ast.Lt: (1, False),
+    ast.GtE: (-1, False),
+    ast.Gt: (-1, False),
+    ast.Eq: (1, True),
+}
+_REQUIREMENT_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "hypot")
+_MEASURE = re.compile(
+    r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*(um|mm|cm|m|km|in|ft|deg|rad)\b"
+)
+
+
+def requirement(text: Any, name: str = "constraints.require") -> constraint.Require:
+    """Convert a text such as ``"crank_length + rocker_length <= 300 mm"`` to a constraint.
+
+    The text compares two sides by ``<=``, ``>=`` or ``==``. A side may contain dimensions by their name in `Linkage`, numbers
+    with a unit of length or angle or without a unit (SI), ``+ - * / **``, brackets, ``pi`` and functions, nothing else.
+
+    Raises InputError if the text is not a constraint; the message names the wrong part.
+    """
+    if not isinstance(text, str):
+        raise ParameterError(name, text, "be a text such as 'crank_length <= 50 mm'")
+    units, what = {"deg": "rad", "rad": "rad"}, f"the requirement {text!r}"
+    plain = _MEASURE.sub(lambda found: repr(quantity(found[0], units.get(found[2], "m"), name)), text)
+    tree = parse_expression(plain, "the requirement")
+    if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and type(tree.ops[0]) in _COMPARISONS):
+        raise InputError(f"{what} is no comparison: it must have two sides about <=, >= or ==")
+    sign, equal = _COMPARISONS[type(tree.ops[0])]
+    sides = (tree.left, tree.comparators[0])[::sign]
+    functions = {f: getattr(symbolic.library(), f) for f in _REQUIREMENT_FUNCTIONS}
+
+    def difference(d: Any) -> Any:
+        less, more = (evaluate_expression(side, what, {**vars(d), "pi": pi}, functions) for side in sides)
+        return less - more
+
+    trial = dict(zip(constraint.UNKNOWNS, np.geomspace(0.1, 0.2, len(constraint.UNKNOWNS)).tolist()))
+    if np.isinf(difference(SimpleNamespace(**trial))):
+        raise InputError(f"{what} has a number that is too large")
+    numbers = [abs(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant)]  # type: ignore[arg-type]
+    return constraint.Require(
+        function=difference, equal=equal, name=text, scale=float(max(numbers, default=0.0)) or 1.0
+    )
 
 
 def _transmission(value: Any, name: str) -> float | None:
@@ -153,12 +201,12 @@ class Constraints:
             if value is not None and all(getattr(self, carrier) is None for carrier in carriers):
                 raise ParameterError(f"constraints.{name}", value, f"come with {' or '.join(carriers)}")
 
-    def constraints(self) -> tuple[constraint.Constraint | constraint.Stroke, ...]:
+    def constraints(self) -> tuple[constraint.Constraint, ...]:
         """Return the constraints; if the crank cannot turn fully, the transmission angle is bounded only over the task."""
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
         pins = PINS if self.pins is None else self.pins
-        made: tuple[tuple[Any, Callable[[Any], constraint.Constraint | constraint.Stroke]], ...] = (
+        made: tuple[tuple[Any, Callable[[Any], constraint.Constraint]], ...] = (
             (self.least_transmission_angle, lambda angle: constraint.LeastTransmission(angle=angle, over=over)),
             (self.full_turn or None, lambda _: constraint.FullTurn()),
             (self.grashof, lambda kind: constraint.Grashof(type=kind)),
@@ -212,7 +260,7 @@ TABLES: Mapping[str, type] = {
 }
 
 
-def _constraints(value: Any, name: str) -> tuple[constraint.Constraint | constraint.Stroke, ...]:
+def _constraints(value: Any, name: str) -> tuple[constraint.Constraint, ...]:
     return files.read(Constraints, value, name).constraints()
 
 
@@ -229,7 +277,7 @@ class SynthesisCase:
     title: str = files.entry(files.text)
     task: Task = files.entry(files.any_value)
     bounds: Mapping[str, tuple[float, float]] = files.entry(BOUNDS, factory=dict)
-    constraints: tuple[constraint.Constraint | constraint.Stroke, ...] = files.entry(_constraints, constraint.USUAL)
+    constraints: tuple[constraint.Constraint, ...] = files.entry(_constraints, constraint.USUAL)
     search: SearchTable = files.entry(files.Table(SearchTable), SearchTable())
     make: MachineSpec = files.entry(files.Table(MachineSpec), MachineSpec())
     trade_off: TradeOffTable | None = files.entry(_trade_off, None)
@@ -259,7 +307,7 @@ class SynthesisCase:
         return "" if closed else worst_violation(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
-        """Compute the pin forces of solutions by simulation; None if no constraint involves pin forces."""
+        """Compute the pin forces of solutions; None if no constraint involves pin forces."""
         if not any(isinstance(c, constraint.FORCES) for c in self.constraints):
             return None
         return [pin_forces(s.linkage, self.make, s.rotation_range) for s in solutions]

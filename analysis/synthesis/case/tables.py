@@ -17,9 +17,8 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ...files import Choice, Kinds, Many, Quantity, Table, Whole, any_value, entry, flag, read, read_points, text
 from ...units import quantity
-from ..exact.quick_return import QuickReturn, QuickSwing
-from ..task.formula import function_from_formula, path_from_formula
-from ..task.target import TargetPath, transform_points
+from ..exact.generation import QuickReturn, QuickSwing
+from ..task.target import TargetPath, function_from_formula, path_from_formula, transform_points
 from ..task.task import (
     Motion,
     Objective,

@@ -1,8 +1,8 @@
 from .burmester import Guidance as Guidance
 from .burmester import GuidanceMap as GuidanceMap
 from .burmester import guidance as guidance
-from .four_bar import Generators as Generators
-from .four_bar import cognates as cognates
-from .four_bar import function_generators as function_generators
-from .quick_return import QuickReturn as QuickReturn
-from .quick_return import QuickSwing as QuickSwing
+from .generation import Generators as Generators
+from .generation import QuickReturn as QuickReturn
+from .generation import QuickSwing as QuickSwing
+from .generation import cognates as cognates
+from .generation import function_generators as function_generators

@@ -1,10 +1,9 @@
 from .linkage import ANGLES as ANGLES
+from .linkage import Kind as Kind
 from .linkage import Linkage as Linkage
+from .linkage import SecondCrank as SecondCrank
+from .linkage import SliderMotion as SliderMotion
 from .machine import PINS as PINS
 from .machine import MachineSpec as MachineSpec
 from .machine import PinForces as PinForces
-from .machine import description as description
 from .machine import pin_forces as pin_forces
-from .pivot import Kind as Kind
-from .pivot import SecondCrank as SecondCrank
-from .pivot import SliderMotion as SliderMotion

@@ -16,21 +16,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from math import atan2, cos, hypot, isfinite, pi, sin
+from fractions import Fraction
+from math import cos, isfinite, pi, sin
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, ParameterError
-from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...mechanisms import FIVE_BAR
+from ...numerics.fourier import FourierSeries
 from ...run import symbolic_equations
 from ...units import in_si
 from .kernels import PLACES, close_slider_crank, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
-from .pivot import Kind, SecondCrank, SliderMotion, format_ratio, gear_turns
 
 FloatArray = NDArray[np.float64]
 #: Names of the dimensions: links, which are greater than zero; all lengths; angles.
@@ -50,64 +50,119 @@ def wrap_angles(angle: FloatArray) -> FloatArray:
     return (angle + pi) % (2.0 * pi) - pi
 
 
-def bar_mass_properties(length: Any, line: float, width: float) -> tuple[Any, Any]:
-    """Return the mass of a rectangular bar (kg) and its moment of inertia about its centre (kg.m2).
-
-    ``length`` is the distance between its pins (m), ``line`` the mass per length (kg/m), ``width`` its width (m).
-    """
-    mass = line * length
-    return mass, mass * (length * length + width * width) / 12.0
+#: The kinds of linkages; a kind need not be one of the mechanisms that can be simulated.
+Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]
+#: Greatest number of turns of either crank per period of a geared five-bar.
+TEETH = 6
 
 
-def link_mass_properties(
-    l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool
-) -> dict[str, Any]:
-    """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
+@dataclass(frozen=True, slots=True, eq=False)
+class SliderMotion:
+    """Motion of the rocker pivot D along a guide: a Fourier series of the crank's rotation phi.
 
-    Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
-    and C (``straight``), it is one bar over the whole length.
-
-    Parameters
+    Attributes
     ----------
-    l2, l3, l4, r, a2 : float
-        Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
-    line : float
-        Mass of a bar per length (kg/m).
-    width : float
-        Width of a bar (m).
-    straight : bool
-        Whether P is on the line of B and C.
+    series : FourierSeries
+        Position u(phi) on the guide from the end E of the ground link (m); its order is the number of harmonics.
+    guide_angle : float
+        alpha, the guide's direction from the ground link (rad).
+
+    Raises
+    ------
+    ParameterError
+        If the guide's angle is not finite.
     """
-    m2, i2 = bar_mass_properties(l2, line, width)
-    m4, i4 = bar_mass_properties(l4, line, width)
-    if straight:
-        end = r * cos(a2)
-        low, high = min(0.0, end), max(l3, end)
-        m3, i3 = bar_mass_properties(high - low, line, width)
-        x, y = 0.5 * (low + high), 0.0
-    else:
-        (along, own), (aside, inertia) = bar_mass_properties(l3, line, width), bar_mass_properties(r, line, width)
-        bx, px, py = 0.5 * l3, 0.5 * r * cos(a2), 0.5 * r * sin(a2)
-        m3 = along + aside
-        x, y = (along * bx + aside * px) / m3, aside * py / m3
-        i3 = own + along * ((bx - x) ** 2 + y**2) + inertia + aside * ((px - x) ** 2 + (py - y) ** 2)
-    return {
-        "crank_mass": m2,
-        "crank_inertia": i2 + m2 * (0.5 * l2) ** 2,
-        "crank_cog_distance": 0.5 * l2,
-        "coupler_mass": m3,
-        "coupler_inertia": i3,
-        "coupler_cog_distance": hypot(x, y),
-        "coupler_cog_angle": atan2(y, x),
-        "rocker_mass": m4,
-        "rocker_inertia": i4,
-        "rocker_cog_distance": 0.5 * l4,
-    }
+
+    series: FourierSeries
+    guide_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.guide_angle):
+            raise ParameterError("guide_angle", self.guide_angle, "be a finite number")
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""
+        u = self.series(rotation)
+        return u * cos(self.guide_angle), u * sin(self.guide_angle)
+
+    @property
+    def stroke(self) -> float:
+        """Return the distance between the ends of the slider's travel (m)."""
+        return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
+
+    def scale(self, factor: float) -> SliderMotion:
+        """Return the motion for the same linkage with all lengths multiplied by the factor."""
+        return replace(self, series=self.series * factor)
 
 
-def is_on_line(l3: float, r: float, a2: float) -> bool:
-    """Return whether the coupler point, with the polar coordinates r (m) and a2 (rad) from B, is on the line of B and C."""
-    return abs(sin(a2)) * r <= 1e-9 * l3
+def gear_turns(ratio: float) -> tuple[int, int]:
+    """Return the least whole numbers k and m: the first crank turns k times while the second crank turns m times.
+
+    The quotient m/k is the ratio.
+
+    Raises ParameterError if the ratio is neither zero nor a quotient of whole numbers up to six.
+    """
+    if isfinite(ratio):
+        near = Fraction(ratio).limit_denominator(TEETH)
+        if abs(near - Fraction(ratio)) <= 1e-9 and abs(near.numerator) <= TEETH:
+            return near.denominator, near.numerator
+    raise ParameterError("ratio of the second crank", ratio, f"be a ratio of whole numbers up to {TEETH}")
+
+
+def format_ratio(ratio: float) -> str:
+    """Format a gear ratio, as in "2", "-1" or "1/2"."""
+    return str(Fraction(ratio).limit_denominator(TEETH))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SecondCrank:
+    """Motion of the rocker pivot D of a five-bar: on a second crank, geared to the first or turned independently.
+
+    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio.
+    The input shaft, with the rotation phi, turns once per period of the linkage, in which the first crank turns k times.
+
+    Attributes
+    ----------
+    length : float
+        l5 (m).
+    ratio : float
+        Turns of the second crank per turn of the first: a quotient of whole numbers up to six.
+    phase : float
+        psi at phi = 0, without the series (rad).
+    series : FourierSeries
+        Rotation that is added to the rotation by the gears, a function of phi (rad); zero if gears alone turn the crank.
+
+    Raises
+    ------
+    ParameterError
+        If the length is not greater than zero, the ratio is not a quotient as above, or the phase is not finite.
+    """
+
+    length: float
+    ratio: float = 1.0
+    phase: float = 0.0
+    series: FourierSeries = field(default_factory=lambda: FourierSeries.constant(0.0))
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.length) and self.length > 0.0):
+            raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
+        gear_turns(self.ratio)
+        if not isfinite(self.phase):
+            raise ParameterError("second_crank_phase", self.phase, "be a finite number")
+
+    def angle(self, rotation: ArrayLike) -> FloatArray:
+        """Return psi, the angle of the second crank (rad)."""
+        phi = np.asarray(rotation, dtype=float)
+        return gear_turns(self.ratio)[1] * phi + self.phase + self.series(phi)
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""
+        psi = self.angle(rotation)
+        return self.length * np.cos(psi), self.length * np.sin(psi)
+
+    def scale(self, factor: float) -> SecondCrank:
+        """Return the motion for the same linkage with all lengths multiplied by the factor."""
+        return replace(self, length=self.length * factor)
 
 
 @in_si(**UNITS)
@@ -294,10 +349,7 @@ class Linkage:
 
         For a slider-crank D is the slider, at C.
 
-        Raises
-        ------
-        AssemblyError
-            If the links cannot be joined there.
+        Raises AssemblyError if the links cannot be joined there.
         """
         g = self.directions([rotation])[:, 0]
         if not np.isfinite(g).all():
@@ -431,63 +483,6 @@ class Linkage:
     def turns_fully(self) -> bool:
         """Return whether the crank can turn fully, while a moving pivot follows its motion."""
         return self.least_transmission > 0.0
-
-    def to_five_bar(
-        self,
-        *,
-        density: float = 7850.0,
-        section: tuple[float, float] = (0.02, 0.005),
-        slider_mass: float | None = None,
-        slider_stiffness: float = 0.0,
-        slider_damping: float = 0.0,
-        slider_coulomb_friction: float = 0.0,
-        gravity: float = 9.81,
-    ) -> FiveBarParameters:
-        """Return the parameters of the five-bar model and its FMU, with masses from density and section.
-
-        The links are bars, see `link_mass_properties`. The model's x axis is the ground link; its inclination to the
-        horizontal is the ground angle. A fixed rocker pivot becomes a slider: give the slider a spring, or hold it by a force.
-
-        Parameters
-        ----------
-        density, section : float, (float, float)
-            Density (kg/m3), steel by default; width in the plane and thickness of every bar (m).
-        slider_mass : float, optional
-            Mass of the slider (kg); by default that of a block of four widths by two widths by four thicknesses.
-        slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
-            As in `FiveBarParameters`.
-
-        Raises
-        ------
-        ParameterError
-            If density or section are not greater than zero, the linkage is a slider-crank, or the pivot is on a second crank.
-        """
-        width, thickness = section
-        for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
-            if not (isfinite(value) and value > 0.0):
-                raise ParameterError(name, value, "be a finite number greater than zero")
-        if self.kind != "four-bar":
-            raise ParameterError(
-                "kind", self.kind, "be 'four-bar': the plant of the five-bar slider has no other linkage"
-            )
-        r, a2 = self.point_distance, self.point_angle
-        links: dict[str, float] = {name: getattr(self, name) for name in LINKS}
-        straight = is_on_line(self.coupler_length, r, a2)
-        l2, l3, l4 = self.crank_length, self.coupler_length, self.rocker_length
-        own = link_mass_properties(l2, l3, l4, r, a2, density * width * thickness, width, straight)
-        return FiveBarParameters(
-            **links | own,
-            slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
-            slider_guide_angle=self.pivot.guide_angle if isinstance(self.pivot, SliderMotion) else 0.0,
-            slider_stiffness=slider_stiffness,
-            slider_damping=slider_damping,
-            slider_coulomb_friction=slider_coulomb_friction,
-            coupler_point_distance=r,
-            coupler_point_angle=a2,
-            gravity=gravity,
-            ground_inclination=self.ground_angle,
-            assembly_branch=self.branch,
-        )
 
 
 @in_si(**UNITS)

@@ -1,34 +1,35 @@
-"""Compute parameters and pin forces of a machine, a linkage with material, speed and load; write it as a case file.
+"""Analyse a linkage as a machine, with material, speed and load: plant parameters, pin forces, limit positions.
 
-The plant is the model that simulates the machine: the slider-crank, or the five-bar with a slider at the rocker pivot D."""
+The plant is the model that simulates the machine: the slider-crank, or the five-bar with a slider at the rocker pivot D. In a
+dead centre crank and coupler are collinear, and rocker or slider rest at the end of their travel. In a toggle coupler and
+rocker are collinear, or the coupler is perpendicular to the guide, and the crank can turn no further. See R. L. Norton, Design
+of Machinery, 6th ed., 2020, chapters 2, 3 and 6.
+"""
 
 from __future__ import annotations
 
-from cmath import rect
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from functools import cache
-from math import cos, pi, remainder, sin, tau
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache, partial
+from math import acos, atan2, cos, hypot, inf, pi, sin
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import AssemblyError, InputError, ParameterError
-from linkwork.five_bar.dynamics import Inputs as Acting
-from linkwork.five_bar.dynamics import Motion
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.errors import AssemblyError, ParameterError
+from linkwork.five_bar import kinematics
+from linkwork.five_bar.dynamics import Inputs, Motion
+from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ...files import Many, Quantity, entry
 from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
-from ...run import Inputs, parameter_symbols, simulate
-from ...units import with_unit
-from . import linkage as geometry
-from .linkage import Linkage, SliderCrank, is_on_line
-from .pivot import SecondCrank, SliderMotion
+from ...run import parameter_symbols
+from .linkage import LINKS, FiveBar, Kind, Linkage, SliderCrank, SliderMotion
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
@@ -38,9 +39,69 @@ FAR = 1e7
 STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
+def bar_mass_properties(length: Any, line: float, width: float) -> tuple[Any, Any]:
+    """Return the mass of a rectangular bar (kg) and its moment of inertia about its centre (kg.m2).
+
+    ``length`` is the distance between its pins (m), ``line`` the mass per length (kg/m), ``width`` its width (m).
+    """
+    mass = line * length
+    return mass, mass * (length * length + width * width) / 12.0
+
+
+def link_mass_properties(
+    l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool
+) -> dict[str, Any]:
+    """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
+
+    Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
+    and C (``straight``), it is one bar over the whole length.
+
+    Parameters
+    ----------
+    l2, l3, l4, r, a2 : float
+        Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
+    line : float
+        Mass of a bar per length (kg/m).
+    width : float
+        Width of a bar (m).
+    straight : bool
+        Whether P is on the line of B and C.
+    """
+    m2, i2 = bar_mass_properties(l2, line, width)
+    m4, i4 = bar_mass_properties(l4, line, width)
+    if straight:
+        end = r * cos(a2)
+        low, high = min(0.0, end), max(l3, end)
+        m3, i3 = bar_mass_properties(high - low, line, width)
+        x, y = 0.5 * (low + high), 0.0
+    else:
+        (along, own), (aside, inertia) = bar_mass_properties(l3, line, width), bar_mass_properties(r, line, width)
+        bx, px, py = 0.5 * l3, 0.5 * r * cos(a2), 0.5 * r * sin(a2)
+        m3 = along + aside
+        x, y = (along * bx + aside * px) / m3, aside * py / m3
+        i3 = own + along * ((bx - x) ** 2 + y**2) + inertia + aside * ((px - x) ** 2 + (py - y) ** 2)
+    return {
+        "crank_mass": m2,
+        "crank_inertia": i2 + m2 * (0.5 * l2) ** 2,
+        "crank_cog_distance": 0.5 * l2,
+        "coupler_mass": m3,
+        "coupler_inertia": i3,
+        "coupler_cog_distance": hypot(x, y),
+        "coupler_cog_angle": atan2(y, x),
+        "rocker_mass": m4,
+        "rocker_inertia": i4,
+        "rocker_cog_distance": 0.5 * l4,
+    }
+
+
+def is_on_line(l3: float, r: float, a2: float) -> bool:
+    """Return whether the coupler point, with the polar coordinates r (m) and a2 (rad) from B, is on the line of B and C."""
+    return abs(sin(a2)) * r <= 1e-9 * l3
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MachineSpec:
-    """Material, bar sections, slider, speed and load of a linkage; see `Linkage.to_five_bar`.
+    """Material, bar sections, slider, speed and load of a linkage.
 
     Attributes
     ----------
@@ -168,31 +229,60 @@ class MachineSpec:
     def sliding_five_bar(self, linkage: Linkage) -> FiveBarParameters:
         """Return the parameters of the five-bar plant for a linkage; the plant's slider at D is free to move.
 
-        A slider-crank becomes a four-bar with a very long rocker, of `FAR` coupler lengths. The mass of its slider is at C, at
-        the end of this rocker.
+        The model's x axis is the ground link; its inclination to the horizontal is the ground angle. A fixed rocker pivot
+        becomes a slider: give the slider a spring, or hold it by a force. A slider-crank becomes a four-bar with a very long
+        rocker, of `FAR` coupler lengths. The mass of its slider is at C, at the end of this rocker.
+
+        Raises ParameterError if the pivot is on a second crank.
         """
-        far, sliding, four_bar = FAR * linkage.coupler_length, isinstance(linkage, SliderCrank), linkage
-        if sliding:
-            away: Any = {"rocker_length": far, "ground_length": linkage.ground_length + far}
-            four_bar = Linkage(**linkage.values() | away)
-        made = four_bar.to_five_bar(
-            density=self.density,
-            section=(self.width, self.thickness),
+        if isinstance(linkage, FiveBar):
+            raise ParameterError(
+                "kind", linkage.kind, "be another: the plant of the five-bar slider has no second crank"
+            )
+        straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
+        return FiveBarParameters(
+            **self.plant_values(linkage, straight, isinstance(linkage, SliderCrank), link_mass_properties),
             slider_mass=self.block_mass,
+            slider_guide_angle=linkage.pivot.guide_angle if isinstance(linkage.pivot, SliderMotion) else 0.0,
             slider_stiffness=self.slider_stiffness or 0.0,
             slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
-            gravity=self.gravity,
+            slider_spring_free_position=self.slider_spring_free_position,
         )
-        own = self.link_masses(asdict(made)) | {"slider_spring_free_position": self.slider_spring_free_position}
-        return replace(made, **own | (self.slider_as_rocker(far) if sliding else {}))
 
-    def slider_as_rocker(self, far: Any) -> dict[str, Any]:
-        """Return mass, moment of inertia and centre of mass of the rocker that represents the slider of a slider-crank.
+    def plant_values(self, d: Any, straight: bool, sliding: bool, law: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+        """Return the parameters of the five-bar plant for a linkage, by name, without those of the plant's slider.
 
-        ``far`` is the length of that rocker (m); see `sliding_five_bar`.
+        Parameters
+        ----------
+        d : namespace
+            Dimensions and branch, by their names in `Linkage`: numbers or CasADi symbols.
+        straight : bool
+            Whether the coupler point is on the line of B and C.
+        sliding : bool
+            Whether the linkage is a slider-crank; see `sliding_five_bar`.
+        law : callable
+            `link_mass_properties`, for numbers or symbols.
         """
-        return {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
+        links, far = {name: getattr(d, name) for name in LINKS}, FAR * d.coupler_length
+        if sliding:
+            links |= {"ground_length": d.ground_length + far, "rocker_length": far}
+        r, a2, line = d.point_distance, d.point_angle, self.density * self.width * self.thickness
+        made = law(d.crank_length, d.coupler_length, links["rocker_length"], r, a2, line, self.width, straight)
+        made |= self.link_masses(made)
+        if sliding:
+            made |= {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
+        return (
+            links
+            | made
+            | {
+                "coupler_point_distance": r,
+                "coupler_point_angle": a2,
+                "gravity": self.gravity,
+                "ground_inclination": d.ground_angle,
+                "assembly_branch": d.branch,
+            }
+        )
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
         """Return the parameters of the plant for a linkage: `slider_crank` for a slider-crank, otherwise `five_bar`."""
@@ -215,12 +305,8 @@ USUAL_MAKE = MachineSpec()
 
 FloatArray = NDArray[np.float64]
 PINS = "ABCD"
-#: Number of steps at which a run of the plant is sampled.
+#: Number of steps of the crank between the rotations at which pin forces are computed.
 SAMPLES = 720
-#: Greatest number of runs until a slider has settled.
-SETTLING = 5
-#: Mass of the slider that represents a fixed pivot in a run, relative to the mass of the links.
-HEAVY = 1e8
 
 
 def pin_functions(
@@ -242,37 +328,8 @@ def pin_functions(
     """
     casadi = symbolic.library()
     kind, plant, law = _trace_plant()
-    line = make.density * make.width * make.thickness
-    links = {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
-    far = FAR * d.coupler_length
-    sliding = linkage is SliderCrank
-    if sliding:
-        links |= {"ground_length": d.ground_length + far, "rocker_length": far}
-    made = law(
-        d.crank_length,
-        d.coupler_length,
-        links["rocker_length"],
-        d.point_distance,
-        d.point_angle,
-        line,
-        make.width,
-        straight,
-    )
-    parameters = kind(
-        **_DEFAULTS
-        | links
-        | made
-        | make.link_masses(made)
-        | (make.slider_as_rocker(far) if sliding else {})
-        | {
-            "slider_mass": 1.0,
-            "coupler_point_distance": d.point_distance,
-            "coupler_point_angle": d.point_angle,
-            "gravity": make.gravity,
-            "ground_inclination": d.ground_angle,
-            "assembly_branch": d.branch,
-        }
-    )
+    values = make.plant_values(d, straight, linkage is SliderCrank, law)
+    parameters = kind(**_DEFAULTS | values | {"slider_mass": 1.0})
     p = parameters.constants()
     load = make.load_components(casadi.cos(d.ground_angle), casadi.sin(d.ground_angle))
     w2 = make.speed
@@ -282,7 +339,7 @@ def pin_functions(
     # the slider is held and the crank's speed constant: only centripetal accelerations remain
     e3, e4 = plant.centripetal(g, w2, w3, w4, p)
     held = Motion(w3, w4, 0.0, 0.0, e3, e4, 0.0, 0.0, 0.0, 0.0, 0.0)
-    f = plant.reactions(g, (crank_angle, 0.0, w2, 0.0, 0.0, 0.0), held, Acting(1.0, 0.0, 0.0, 0.0, *load), p)
+    f = plant.reactions(g, (crank_angle, 0.0, w2, 0.0, 0.0, 0.0), held, Inputs(1.0, 0.0, 0.0, 0.0, *load), p)
     return {"A": (f.ax, f.ay), "B": (f.bx, f.by), "C": (f.cx, f.cy), "D": (f.dx, f.dy)}
 
 
@@ -291,7 +348,7 @@ def _trace_plant() -> tuple[Any, Any, Any]:
     """Return the five-bar plant's parameter class and functions, and `link_mass_properties`, all for CasADi symbols."""
     casadi = symbolic.library()
     plant = parameter_symbols(FIVE_BAR)
-    law = symbolic.symbolic_functions((geometry,), min=casadi.fmin, max=casadi.fmax)
+    law = symbolic.symbolic_functions((sys.modules[__name__],), min=casadi.fmin, max=casadi.fmax)
     return type(plant.parameters), plant.functions, law.link_mass_properties
 
 
@@ -312,13 +369,10 @@ class PinForces:
         Crank rotations relative to the start of the task (rad).
     force : ndarray, shape (n, 4)
         Magnitudes of the forces on the pins A to D (N).
-    moved : float
-        Greatest displacement of the slider that represents the fixed pivot D (m).
     """
 
     rotation: FloatArray
     force: FloatArray
-    moved: float
 
     @property
     def greatest(self) -> float:
@@ -330,18 +384,9 @@ class PinForces:
         """Return the letter of the pin with the greatest force."""
         return PINS[int(self.force.max(axis=0).argmax())]
 
-    def greatest_force(self, pins: str) -> float:
-        """Return the greatest force on any of the pins whose letters are in ``pins`` (N)."""
-        return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
-
-def pin_forces(
-    linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None, *, run: bool = True
-) -> PinForces:
-    """Compute the forces on the pins of a linkage at constant crank speed.
-
-    With ``run`` the compiled plant is simulated; its slider at D is so heavy that it hardly moves, and the control force
-    carries the slider's weight. Otherwise the plant's equations are evaluated with the slider fixed.
+def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None) -> PinForces:
+    """Compute the forces on the pins of a linkage at constant crank speed, from the equations of the five-bar plant.
 
     Parameters
     ----------
@@ -350,8 +395,6 @@ def pin_forces(
     make : MachineSpec
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.
-    run : bool
-        Whether to simulate the plant.
 
     Raises
     ------
@@ -362,209 +405,158 @@ def pin_forces(
     """
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: for a moving pivot use slider.inverse_dynamics")
-    begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
-    if not run:
-        return _evaluate_forces(linkage, make, np.linspace(begin, end, SAMPLES + 1))
-    made = make.sliding_five_bar(linkage)
-    heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
-    parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
-    x, y = make.load_components(np.cos(linkage.ground_angle), np.sin(linkage.ground_angle))
-    weight = heavy * make.gravity * float(np.sin(linkage.ground_angle))
-    acting = Inputs(speed=make.speed, force=weight, load_x=float(x), load_y=float(y))
-    start = InitialState(crank_angle=begin + linkage.crank_phase)
-    samples = np.linspace(0.0, (end - begin) / make.speed, SAMPLES + 1)
-    done = simulate(parameters, acting, initial=start, samples=samples)
-    if done.time[-1] < samples[-1]:
-        raise InputError(
-            f"the plant did not run from a crank rotation of {begin:.6g} rad to {end:.6g} rad: {done.message}"
-        )
-    force = np.column_stack([np.hypot(done[f"pin.{pin}.fx"], done[f"pin.{pin}.fy"]) for pin in PINS])
-    moved = float(np.abs(done["slider.position"]).max())
-    return PinForces(rotation=begin + make.speed * done.time, force=force, moved=moved)
-
-
-def _evaluate_forces(linkage: Linkage, make: MachineSpec, rotation: FloatArray) -> PinForces:
-    """Compute the pin forces at crank rotations from the equations of the five-bar plant, with the slider at D fixed."""
+    at = np.linspace(*((0.0, 2.0 * pi) if rotation is None else rotation), SAMPLES + 1)
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
-    th2 = casadi.DM(linkage.crank_angle(rotation))
-    found = pin_functions(d, make, th2, straight=straight, linkage=type(linkage))
+    found = pin_functions(d, make, casadi.DM(linkage.crank_angle(at)), straight=straight, linkage=type(linkage))
     force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])
-    if not np.isfinite(force).all():
-        at = float(rotation[np.argmin(np.isfinite(force).all(axis=1))])
-        raise AssemblyError(f"the links cannot be joined at a crank rotation of {at:.6g} rad")
-    return PinForces(rotation=rotation, force=force, moved=0.0)
+    joined = np.isfinite(force).all(axis=1)
+    if not joined.all():
+        raise AssemblyError(f"the links cannot be joined at a crank rotation of {float(at[joined.argmin()]):.6g} rad")
+    return PinForces(rotation=at, force=force)
 
 
-def settle_slider(
-    parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
-) -> tuple[float, float]:
-    """Return position (m) and velocity (m/s) of a slider that a run of ``duration`` (s) returns to; zeros if it has none.
+# Limit positions and mechanical advantage
 
-    With a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
-    is repeated at most `SETTLING` times until the slider is within a millionth of its travel. SciPy's method is used: to
-    compile the solver would take longer.
+
+class _FourBarPositions:
+    """Conditions for the limit positions of a four-bar, for numbers and symbols; see `POSITIONS`."""
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        """Return the closure error of the triangle A, C, D, zero in a dead centre.
+
+        ``reach`` is the distance AC, ``c`` the cosine of the angle at A, ``d`` has the dimensions.
+        """
+        l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
+        return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        """Return a value that is zero in a toggle; c is the cosine of the crank angle, side 1 for stretched, -1 for folded."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        reach = l3 + l4 if side > 0.0 else l3 - l4
+        return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+
+    @staticmethod
+    def speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        """Return the speed of the driven link divided by the speed of the crank; ``g`` is the position of the closed loop."""
+        lengths: Any = SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)
+        return kinematics.coefficients(g, lengths).k42
+
+
+class _SliderCrankPositions(_FourBarPositions):
+    """Conditions for the limit positions of a slider-crank; in a toggle the coupler is perpendicular to the guide."""
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        return (d.ground_length - reach * c) / d.coupler_length
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        return (d.ground_length - d.crank_length * c) / d.coupler_length - side
+
+    @staticmethod
+    def speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        return (g.s3 * g.c2 - g.c3 * g.s2) / g.s3
+
+
+#: Conditions for each kind of linkage; a geared five-bar has no dead centres.
+POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
+    "four-bar": _FourBarPositions,
+    "slider-crank": _SliderCrankPositions,
+}
+
+
+def dead_centres(linkage: Linkage) -> tuple[float, ...]:
+    """Return the crank rotations of the dead centres, within a turn from 0 (rad), in increasing order; empty if there are none.
+
+    Raises ParameterError if the rocker pivot moves.
     """
-    slider = 0.0, 0.0
-    for _ in range(SETTLING):
-        start = InitialState(crank_angle=crank_angle, slider_position=slider[0], slider_velocity=slider[1])
-        run = simulate(parameters, acting, initial=start, stop_time=duration, step=duration / 64.0, method="LSODA")
-        if run.status:
-            break
-        before, slider = slider, (float(run["slider.position"][-1]), float(run["slider.velocity"][-1]))
-        swept = max(np.abs(run["slider.position"]).max(), np.abs(run["slider.velocity"]).max() * duration / (2.0 * pi))
-        if max(abs(slider[0] - before[0]), abs(slider[1] - before[1]) * duration / (2.0 * pi)) <= 1e-6 * swept:
-            return slider
-    return 0.0, 0.0
+    _require_fixed_pivot(linkage)
+    l2, l3 = linkage.crank_length, linkage.coupler_length
+    found = []
+    # distance of C from A with coupler and crank in line, stretched and folded
+    for reach in (l3 + l2, l3 - l2):
+        if reach == 0.0:
+            continue
+        # cosine of the coupler's direction, which points to the side of the assembly
+        cosine = _linear_root(partial(POSITIONS[linkage.kind].dead_gap, linkage, reach))
+        if abs(cosine) > 1.0:
+            continue
+        th3 = linkage.branch * acos(cosine)
+        found.append(th3 if reach == l3 + l2 else th3 + pi)
+    return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
 
 
-# The linkage as tables of a case file, from which it can be simulated, exported as an FMU and shown in the studio
+def toggles(linkage: Linkage) -> tuple[float, ...]:
+    """Return the crank rotations of the toggles, within a turn from 0 (rad); empty if the crank can turn fully.
 
-
-def description(
-    linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0
-) -> dict[str, Any]:
-    """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
-
-    A rocker pivot that moves on a guide, or on a crank without gears, is a second degree of freedom. For such a linkage
-    `drives` returns the speeds of crank and pivot.
-
-    Parameters
-    ----------
-    linkage : Linkage
-    make : MachineSpec
-        Bars, gravity and the speed of the crank.
-    rotation : float
-        Rotation of the input shaft at the start (rad).
-    direction : float
-        Sense in which the crank turns: +1 counter-clockwise, -1 clockwise.
+    With a moving rocker pivot the results are rotations of the input shaft, which turns once per period of the linkage.
     """
-    a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
-    end = shaft + rect(linkage.ground_length, a1)
-    bodies = {"crank": _bar_table("AB", linkage.crank_length, make, make.crank_mass)}
-    bodies["coupler"] = _bar_table("BC", linkage.coupler_length, make, make.coupler_mass)
-    if linkage.point_distance and not linkage.point_is_pin:
-        point = rect(linkage.point_distance, linkage.point_angle)
-        bodies["coupler"] |= {"points": {"P": _point_entry(point)}, **_coupler_masses(linkage, make)}
-        del bodies["coupler"]["section"]
-    # the angle is not wrapped to a turn, because the position of gears depends on whole turns
-    start = a1 + float(linkage.crank_angle(rotation))
-    crank = {"joint": "A", "start": with_unit(start, "rad"), "speed": with_unit(direction * make.speed, "rad/s")}
-    tables: dict[str, Any] = {
-        "name": "found-linkage",
-        "source": "found by synthesis",
-        "gravity": with_unit(make.gravity, "m/s2"),
-        "ground": {
-            "A": _point_entry(shaft),
-            "E" if linkage.pivot or isinstance(linkage, SliderCrank) else "D": _point_entry(end),
-        },
-        "bodies": bodies,
-        "freedoms": {"crank": crank},
-        "assembly": {"C": linkage.branch},
-    }
-    if isinstance(linkage, SliderCrank):
-        bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
-        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
-    else:
-        bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
-    second = linkage.pivot
-    if isinstance(second, SliderMotion):
-        along = with_unit(a1 + second.guide_angle, "rad")
-        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
-        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": along}}
-        position = with_unit(float(second.series(rotation)), "m")
-        tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
-    elif second is not None:
-        bodies["second"] = _bar_table("ED", second.length, make, None)
-    if isinstance(second, SecondCrank) and second.series.order:
-        angle = with_unit(a1 + float(second.angle(rotation)), "rad")
-        tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
-    elif isinstance(second, SecondCrank):
-        # angle of the second crank while the first crank points along x
-        phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
-        tables["gears"] = {
-            "teeth": {
-                "bodies": ["crank", "second"],
-                "ratio": second.ratio,
-                "phase": with_unit(remainder(phase, tau), "rad"),
-            }
-        }
-    if "slides" in tables and (spring := _spring_table(make)):
-        tables["springs"] = {"slider": {"at": "guide"} | spring}
-    if acting := loads(linkage, make):
-        tables["loads"] = list(acting)
-    return tables
+    if linkage.pivot is not None:
+        return _toggles_by_roots(linkage)
+    found = []
+    for side in (1.0, -1.0):
+        cosine = _linear_root(partial(POSITIONS[linkage.kind].toggle_gap, linkage, side=side))
+        if abs(cosine) <= 1.0:
+            found += [acos(cosine), -acos(cosine)]
+    return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
 
 
-def _spring_table(make: MachineSpec) -> dict[str, Any]:
-    """Return spring, damper and friction of the slider as a description has them; without those that are zero."""
-    values = {
-        "stiffness": (make.slider_stiffness, "N/m"),
-        "free": (make.slider_stiffness and make.slider_spring_free_position, "m"),
-        "damping": (make.slider_damping, "N.s/m"),
-        "friction": (make.slider_coulomb_friction, "N"),
-    }
-    return {name: with_unit(value, unit) for name, (value, unit) in values.items() if value}
+def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
+    """Find the rotations at which the cosine of the angle between coupler and rocker passes -1 or 1."""
+    from scipy.optimize import brentq
+
+    def excess_of_cosine(phi: Any) -> Any:
+        return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
+
+    phi = np.linspace(0.0, 2.0 * pi, 1441)
+    off = excess_of_cosine(phi)
+    passed = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
+    return tuple(float(brentq(excess_of_cosine, phi[k], phi[k + 1], xtol=1e-13)) for k in passed)
 
 
-def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
-    """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
-    if not any(make.load):
-        return {}
-    # the coupler point may be one of the coupler's pins
-    point = "C" if linkage.point_is_pin else "P" if linkage.point_distance else "B"
-    return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
+def time_ratio(linkage: Linkage) -> float | None:
+    """Return the duration of the slow swing or stroke divided by the duration of the quick one; at least 1.
 
+    The crank turns at constant speed. The result is None if the crank cannot turn fully, or if the rocker turns fully, too.
 
-def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
-    """Return the drive tables of a linkage whose pivot is a second degree of freedom: speeds of crank and pivot over time.
-
-    The arguments are those of `description`. For any other linkage the result is empty, because `description` contains the
-    crank speed.
+    Raises ParameterError if the rocker pivot moves.
     """
-    pivot = linkage.pivot
-    sliding = isinstance(pivot, SliderMotion)
-    if pivot is None or not (sliding or pivot.series.order):
-        return {}
-    speed = direction * make.speed
-    rate = speed / linkage.turns
-    slope, unit = pivot.series.derivative(), "m/s" if sliding else "rad/s"
-    k = np.arange(1, slope.order + 1)
-    waves = {
-        "kind": "harmonics",
-        "amplitudes": [with_unit(rate * a, unit) for a in slope.amplitudes[1:]],
-        "frequencies": [with_unit(w, "rad/s") for w in rate * k],
-        "phases": [with_unit(a, "rad") for a in k * rotation - np.arctan2(slope.sin, slope.cos)[1:]],
-    }
-    if isinstance(pivot, SecondCrank):
-        waves["mean"] = with_unit(speed * pivot.ratio, unit)
-    moved = waves if pivot.series.order else with_unit(0.0, unit)
-    return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": moved}}
+    rests = dead_centres(linkage)
+    if len(rests) != 2 or not linkage.turns_fully:
+        return None
+    way = rests[1] - rests[0]
+    return max(way, 2.0 * pi - way) / min(way, 2.0 * pi - way)
 
 
-def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
-    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point; see `link_mass_properties`."""
-    line = make.density * make.width * make.thickness
-    r, a2 = linkage.point_distance, linkage.point_angle
-    straight = is_on_line(linkage.coupler_length, r, a2)
-    links = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
-    made = geometry.link_mass_properties(*links, r, a2, line, make.width, straight)
-    made |= make.link_masses(made)
-    centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
-    return {
-        "mass": with_unit(made["coupler_mass"], "kg"),
-        "cog": _point_entry(centre),
-        "inertia": with_unit(made["coupler_inertia"], "kg.m2"),
-    }
+def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
+    """Return the torque on the rocker divided by the torque on the crank, without friction and masses.
+
+    For a slider-crank the mechanical advantage is the force on the slider divided by the force on the crank pin perpendicular
+    to the crank, which equals the speed of the pin divided by the speed of the slider. It is infinite in a dead centre, zero
+    in a toggle, and NaN if the links cannot be joined. The result has the shape of ``rotation``, the crank rotations (rad).
+
+    Raises ParameterError if the rocker pivot moves.
+    """
+    _require_fixed_pivot(linkage)
+    phi = np.atleast_1d(np.asarray(rotation, dtype=float))
+    th2 = linkage.crank_angle(phi)
+    places: Any = (np.cos(th2), np.sin(th2), *linkage.directions(phi))
+    g = kinematics.Position(*places)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lengths = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
+        speed = POSITIONS[linkage.kind].speed(g, *lengths)
+        ratio = np.where(speed == 0.0, inf, 1.0 / speed)
+    return ratio.reshape(np.shape(rotation))
 
 
-def _point_entry(z: complex) -> list[Any]:
-    """Return a point as a case file gives it, [x, y] with units; exact zeros are the number 0."""
-    return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
+def _require_fixed_pivot(linkage: Linkage) -> None:
+    if linkage.pivot is not None:
+        raise ParameterError("pivot", linkage.pivot, "be fixed: with a moving pivot no link rests in a dead centre")
 
 
-def _bar_table(ends: str, length: float, make: MachineSpec, mass: float | None) -> dict[str, Any]:
-    """Return the table of a bar with the section of ``make``, and with ``mass`` (kg) if it is given."""
-    section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
-    table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}
-    return table if mass is None else table | {"mass": with_unit(mass, "kg")}
+def _linear_root(gap: Callable[[float], float]) -> float:
+    """Return the cosine at which a condition is zero, which is linear in the cosine."""
+    return gap(0.0) / (gap(0.0) - gap(1.0))

@@ -1,8 +1,7 @@
-from .drawing import LinkageScene as LinkageScene
-from .drawing import plates as plates
+from .output import LinkageScene as LinkageScene
+from .output import plates as plates
 from .report import Assessment as Assessment
 from .report import assess as assess
-from .report import sensitivities as sensitivities
 from .solution import Solution as Solution
 from .solution import Verdicts as Verdicts
 from .solution import evaluate as evaluate

@@ -14,10 +14,20 @@ from linkwork.errors import InputError
 
 from ...units import ROUNDING
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrap_angles
-from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
+from ..linkage.linkage import (
+    ANGLES,
+    LENGTHS,
+    LINKS,
+    FiveBar,
+    Linkage,
+    SecondCrank,
+    SliderCrank,
+    SliderMotion,
+    format_ratio,
+    wrap_angles,
+)
+from ..linkage.machine import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.constraint import SECOND_LENGTH, stroke
-from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.task import Normal, PrecisionPoints, RockerFunction, SliderFunction, Task, UntimedPath, normal_form
 from .solution import (
     CLOSELY,
@@ -47,29 +57,6 @@ _IMPROVEMENTS = {
 DIFFERENCE = 1e-5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensitivity:
-    """The effect of one dimension on the error.
-
-    Attributes
-    ----------
-    name : str
-        Field of `Linkage`, or of its pivot's motion.
-    value : float
-        Value of the dimension (m or rad).
-    slope : float
-        Derivative of the sum of weighted squared errors with respect to the dimension: zero at an optimum of this sum inside
-        the bounds. The sum is the quality function; if the quality function is an area, the sum replaces it here.
-    shift : float
-        Root mean square displacement of the traced point, or change of angle, per unit of the dimension.
-    """
-
-    name: str
-    value: float
-    slope: float
-    shift: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rounding:
     """The cost of rounding the dimensions.
@@ -96,24 +83,6 @@ def length_step(linkage: Linkage) -> float:
     """Return the step to which lengths are rounded (m): 0.1 mm, or less for a link below 1 mm."""
     least = min(getattr(linkage, name) for name in LINKS if _is_link(linkage, name))
     return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
-
-
-def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Compute the derivatives of the quality function's residuals with respect to the dimensions.
-
-    Returns the names of the k dimensions; the derivatives of the m residuals, shape (m, k); the residuals, (m,); and the
-    weights of the residuals, (m,). For an untimed path the residuals are the distances along the target's normals.
-    """
-    task, linkage = solution.task, solution.linkage
-    normal = normal_form(task)
-    at = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
-    if at is None:
-        assert normal.points is not None
-        at = nearest_rotations(linkage, normal.places)
-    weights = np.tile(normal.weights, 1 if normal.points is None or isinstance(task, UntimedPath) else 2)
-    if normal.points is not None and normal.angle is not None:
-        weights = np.append(weights, normal.weights)
-    return _names(linkage, normal), *_residuals(linkage, normal, at, isinstance(task, UntimedPath)), weights
 
 
 def _residuals(linkage: Linkage, normal: Normal, rotation: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
@@ -161,27 +130,22 @@ def _residuals(linkage: Linkage, normal: Normal, rotation: FloatArray, across: b
     return np.vstack(blocks), np.concatenate(parts)
 
 
-def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
-    """Compute the effect of each dimension on the error by exact derivatives.
+def displacements(solution: Solution) -> dict[str, float]:
+    """Compute how far each dimension, by name, moves the output: the rms displacement of the traced point per unit (m or rad).
 
-    For an untimed path the error is the sum of squared distances from the stations to the curve, with adapted crank rotations.
+    For a rocker function the result is the change of its angle (rad). For an untimed path, whose crank rotations adapt to the
+    dimension, the displacement is across the curve.
     """
-    names, jacobian, residual, weights = derivatives(solution)
-    slopes = 2.0 * jacobian.T @ (weights * residual)
-    stations = len(normal_form(solution.task).weights)
-    shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
-    values = _dimension_values(solution.linkage)
+    task, linkage = solution.task, solution.linkage
+    normal = normal_form(task)
+    at = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
+    if at is None:
+        at = nearest_rotations(linkage, normal.places)
+    jacobian, _ = _residuals(linkage, normal, at, isinstance(task, UntimedPath))
+    moved = np.sqrt((jacobian**2).sum(axis=0) / normal.n)
     # a rocker's angle depends neither on the position of the linkage nor on its coupler point
-    idle = (
-        set(PLACES) - {*LINKS, "crank_phase"}
-        if isinstance(solution.task, RockerFunction)
-        else set(solution.linkage.absent_dimensions)
-    )
-    return tuple(
-        Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
-        for name, slope, shift in zip(names, slopes, shifts)
-        if name not in idle
-    )
+    idle = set(PLACES) - {*LINKS, "crank_phase"} if normal.of_rocker else set(linkage.absent_dimensions)
+    return {name: float(off) for name, off in zip(_names(linkage, normal), moved) if name not in idle}
 
 
 def round_dimensions(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
@@ -425,6 +389,15 @@ def format_poor(solution: Solution) -> str:
     return f"a poor answer: {said}; {better}"
 
 
+def format_short(solution: Solution) -> str:
+    """Return a note on links that are too short to be built; empty if there are none."""
+    short = [f"{name} of {1e3 * length:.3g} mm" for name, length in solution.short_links.items()]
+    if not short:
+        return ""
+    longest = 1e3 * solution.linkage.largest_link
+    return f"{' and '.join(short)} beside a link of {longest:.4g} mm: a lower bound of the length makes it possible to build"
+
+
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Format rows as a table: the first column aligned left, the others right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
@@ -481,8 +454,8 @@ class Assessment:
             head += f"\n{straight}"
         if solution.variants:
             head += f"\nalso found: {format_variants(solution)}"
-        if self.poor:
-            head += f"\n{self.poor}"
+        for note in filter(None, (self.poor, format_short(solution))):
+            head += f"\n{note}"
         return "\n\n".join([head, table(self.dimensions), self.rounding, table(_station_rows(solution))]) + "\n"
 
 
@@ -567,18 +540,21 @@ def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
     # an untimed path leaves the crank's rotation free, and its start, too
     left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
-    for s in sensitivities(solution):
-        if s.name in left_out:
+    values = _dimension_values(solution.linkage)
+    for name, shift in displacements(solution).items():
+        if name in left_out:
             continue
-        if s.name not in dear:
-            rows.append((s.name, format_dimension(s.name, s.value), "", "", ""))
+        value = format_dimension(name, values[name])
+        if name not in dear:
+            rows.append((name, value, "", "", ""))
             continue
-        off = ANGLE_STEP if s.name in (*ANGLES, *PIVOT_ANGLES) else step
-        cost = factor * max(dear[s.name], 0.0)
+        off = ANGLE_STEP if name in (*ANGLES, *PIVOT_ANGLES) else step
+        cost = factor * max(dear[name], 0.0)
         grown = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
-        shift = scale * off * s.shift
-        moved = f"{shift if shift >= ROUNDING else 0.0:.3g} {length}"
-        rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, grown))
+        moved = scale * off * shift
+        rows.append(
+            (name, value, format_dimension(name, off), f"{moved if moved >= ROUNDING else 0.0:.3g} {length}", grown)
+        )
     return rows
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, degrees, inf, pi, remainder, sin, tau
+from math import degrees, inf, pi
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...display import NotebookResult, format_count
 from ...files import write_csv
-from ...run import Inputs, parameter_tables
-from ...units import with_unit
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import LINKS, Linkage, SliderCrank, wrap_angles
-from ..linkage.machine import MachineSpec, description, drives, loads, settle_slider
-from ..linkage.pivot import SecondCrank, gear_turns
+from ..linkage.linkage import LINKS, Linkage, SecondCrank, SliderCrank, gear_turns, wrap_angles
 from ..task.target import area_difference, curve_distance, half_lengths, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
 
@@ -32,6 +27,8 @@ EXACT = 1e-14
 CURVE = 360
 #: Crank rotations at which a linkage is judged between its first and its last target.
 CLOSELY = 1441
+#: Length of a link relative to the longest below which the link can hardly be built.
+SHORT = 0.01
 #: Greatest differences of near copies: position of a pin, relative to the longest link; ratio of two lengths of one link.
 SHARE, RATIO = 0.03, 1.25
 
@@ -365,10 +362,9 @@ class Solution(NotebookResult):
         own = self.task.straight
         assert own is not None
         line = np.subtract(*self.task.path.points[[own.end, own.start]])
-        part = straightness(
-            self.linkage.path(np.linspace(begin, end, 721)), direction=float(np.arctan2(line[1], line[0]))
-        )
-        return StraightPart(travel=part.travel, flatness=part.flatness, begin=begin, end=end)
+        traced = self.linkage.path(np.linspace(begin, end, 721))
+        travel, flatness = straightness(traced, float(np.arctan2(line[1], line[0])))
+        return StraightPart(travel=travel, flatness=flatness, begin=begin, end=end)
 
     def curve(self, n: int = CURVE) -> FloatArray:
         """Return n points of the traced path (m), shape (n, 2): over a turn, or from the first station to the last."""
@@ -377,10 +373,6 @@ class Solution(NotebookResult):
             return self.linkage.path(np.linspace(at[0], at[-1], n))
         return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
 
-    def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
-        """Return the parameters of the five-bar model and its FMU; see `Linkage.to_five_bar`."""
-        return self.linkage.to_five_bar(**made_of)
-
     @property
     def largest_link(self) -> float:
         """Return the length that `LargestLink` bounds (m): the longest link or, for target points, B to P if that is longer."""
@@ -388,56 +380,16 @@ class Solution(NotebookResult):
         return max(self.linkage.largest_link, point)
 
     @property
+    def short_links(self) -> dict[str, float]:
+        """Return the links that are shorter than a hundredth of the longest link, by name (m)."""
+        linkage = self.linkage
+        return {n: x for n in linkage.links if (x := getattr(linkage, n)) < SHORT * linkage.largest_link}
+
+    @property
     def direction(self) -> float:
         """Return the sense in which the crank turns during the task: 1 counter-clockwise, -1 clockwise."""
         at = self.evaluation.rotation
         return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
-
-    def run_case(self, make: MachineSpec, title: str) -> dict[str, Any]:
-        """Return the tables of a case file that runs the linkage through its task at constant speed.
-
-        A slider-crank runs as the slider-crank mechanism, any other linkage as the five-bar slider; see `docs/case-files.md`.
-        The five-bar's slider starts in its steady motion or, if the crank does not turn fully, in equilibrium.
-        """
-        linkage, at = self.linkage, self.evaluation.rotation
-        start = (0.0 if at is None else float(at[0])) + linkage.crank_phase
-        run: dict[str, Any] = {"revolutions": 2.0}
-        if not self.verdicts.full_turn and at is not None:
-            # a crank that cannot turn fully: from the first target to the last
-            run = {"stop_time": with_unit(float(np.ptp(at)) / make.speed, "s")}
-        across, along = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
-        load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
-        if isinstance(linkage, SliderCrank):
-            # at the slider alone, which the plant loads along its guide
-            load = with_unit(along if linkage.point_is_pin else 0.0, "N")
-        speed, plant, angle = self.direction * make.speed, make.plant(linkage), remainder(start, tau)
-        initial = {"crank_angle": with_unit(angle, "rad")}
-        if isinstance(plant, FiveBarParameters):
-            turning = Inputs(speed=speed if "revolutions" in run else 0.0, load_x=across, load_y=along)
-            position, velocity = settle_slider(plant, turning, angle, tau / make.speed)
-            initial |= {"slider_position": with_unit(position, "m"), "slider_velocity": with_unit(velocity, "m/s")}
-        return {
-            "title": title,
-            **parameter_tables(plant),
-            "initial": initial,
-            "drive": {"speed": with_unit(speed, "rad/s")},
-            **({"load": load} if any(make.load) else {}),
-            "run": run,
-        }
-
-    def described_case(self, make: MachineSpec, title: str) -> dict[str, Any]:
-        """Return the tables of a case file that describes the linkage and simulates it; see `docs/linkages.md`."""
-        at = self.evaluation.rotation
-        start = 0.0 if at is None else float(at[0])
-        tables = description(self.linkage, make, rotation=start, direction=self.direction)
-        moved = drives(self.linkage, make, rotation=start, direction=self.direction)
-        run: dict[str, Any] = {"revolutions": 2.0 * self.linkage.turns}
-        if not self.verdicts.full_turn and at is not None:
-            run = {"stop_time": with_unit(float(np.ptp(at)) * self.linkage.turns / make.speed, "s")}
-        elif moved:
-            turn = tau / make.speed
-            run = {"stop_time": with_unit(2.0 * self.linkage.turns * turn, "s"), "step": with_unit(turn / 360.0, "s")}
-        return {"title": title, "linkage": tables, **moved, **loads(self.linkage, make), "run": run}
 
     def columns(self) -> dict[str, FloatArray]:
         """Return crank rotation, target, traced point or angle, error and transmission angle at each target, by name; SI.

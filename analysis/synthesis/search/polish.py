@@ -1,7 +1,7 @@
 """Optimise from the starts of a scan: SciPy's least squares if there are only bounds, IPOPT if there are constraints.
 
 Both solvers use exact Jacobians. If the objective is not a sum of squares, the squared errors are minimised first. Then
-`refine` minimises the area or the greatest distance between an untimed path and its target. For other tasks IPOPT minimises the
+`fit` minimises the area or the greatest distance between an untimed path and its target. For other tasks IPOPT minimises the
 greatest error at the stations, as an unknown that bounds all errors.
 """
 
@@ -12,40 +12,39 @@ from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
-from math import degrees, inf, pi
+from math import degrees
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from linkwork.errors import InputError
 
-from ..linkage.kernels import coupler_path_jacobian, link_jacobian
-from ..linkage.linkage import ANGLES, FiveBar, SliderCrank, wrap_angles
-from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, gear_turns
+from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel, worker_count
+from ...run import show_progress
+from ..linkage.linkage import ANGLES, FiveBar, SliderCrank, gear_turns
 from ..result.solution import Solution
-from ..task.constraint import UNKNOWNS, Constraint, InfeasibleError, Stroke
-from ..task.limits import Limits, limits_by_kind
+from ..task.constraint import UNKNOWNS, Constraint, InfeasibleError
+from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown, limits_by_kind
 from ..task.task import Normal, normal_form
-from .program import KEPT, Program
-from .refine import ITERATIONS, Refinement
-from .start import (
-    USUAL_SEARCH,
+from .fit import ITERATIONS, Refinement, fit_least_squares, sum_of_squares
+from .program import (
+    KEPT,
     Answer,
-    Search,
+    Program,
     Start,
     clip_to_bounds,
     convert_to_start,
     distances_from_bounds,
     keep_distinct,
-    run_on_cores,
 )
 from .statement import Objective
 
 FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
+Made = TypeVar("Made")
 #: Number of untimed stations up to which least squares is as fast as IPOPT, whose Jacobian is sparse.
 FEW = 20
 #: Number of the best fits from which the greatest error is minimised.
@@ -71,6 +70,72 @@ DIFFERENT = 1e-3
 RACED = 0.02
 #: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Settings of a search.
+
+    Attributes
+    ----------
+    starts : int
+        Number of candidates of the scan from which a search is started.
+    solutions : int
+        Greatest number of different linkages that are returned.
+    seed : int
+        Seed of the random numbers; the same seed gives the same solutions, on any number of cores.
+    candidates : int
+        Number of linkages in the scan.
+    n_jobs : int, optional
+        Number of processes, -1 for one per core. The default is one process; inside `joblib.parallel_config` for a cluster the
+        default is all cores of the cluster.
+    progress : bool
+        Whether to show a progress bar.
+    """
+
+    starts: int = 24
+    solutions: int = 6
+    seed: int = 0
+    candidates: int = 1 << 16
+    n_jobs: int | None = None
+    progress: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("candidates", "solutions"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{getattr(self, name)} {name}: there must be at least one")
+        check_jobs(self.n_jobs)
+        if self.seed < 0 or int(self.seed) != self.seed or int(self.solutions) != self.solutions:
+            raise InputError(
+                f"seed {self.seed} and {self.solutions} solutions: both must be whole numbers, the seed not below zero"
+            )
+
+    @property
+    def cores(self) -> int:
+        """Return the number of workers that share the searches."""
+        return worker_count(self.n_jobs)
+
+
+USUAL_SEARCH = Search()
+#: Default settings if many searches follow one another.
+QUICK_SEARCH = Search(starts=12)
+
+
+def run_on_cores(
+    work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
+) -> tuple[list[Made], bool]:
+    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted the work.
+
+    ``what`` is the text beside the progress bar.
+    """
+    made: dict[int, Made] = {}
+    with record_interrupts() as interrupted, show_progress(search.progress, float(len(items)), what) as show:
+        for number, value in run_in_parallel(work, items, interrupted, n_jobs=search.n_jobs):
+            made[number] = value
+            show(float(len(made)))
+            if interrupted:
+                break
+    return [made[number] for number in sorted(made)], bool(interrupted)
 
 
 class _OneThread(ContextDecorator):
@@ -357,6 +422,8 @@ class Polisher:
         program = self.program("least", exact=True)
         size = program.greatest_value(answer.start)
         found = program.solve(answer.start, size=size)
+        if not found.feasible:
+            found = program.solve(answer.start, size=size, small=True)
         solve: Callable[..., Answer] = partial(program.solve, size=size)
         if self.normal.outline is not None:
             # the error is bounded at the stations first, then along the whole curves
@@ -425,7 +492,7 @@ class Polisher:
 
 
 def worst_violation(
-    solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
+    solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint]
 ) -> str:
     """Return as text the constraint or bound that a linkage violates most, and by how much; empty if it violates none."""
     task, linkage = solution.task, solution.linkage
@@ -443,116 +510,3 @@ def worst_violation(
     name = UNKNOWNS[int(off.argmax())]
     over = f"{degrees(off.max()):.3g} deg" if name in ANGLES else f"{1e3 * normal.unit * off.max():.6g} mm"
     return f"bound of {name} by {over}"
-
-
-# Least squares
-
-
-def residuals(
-    normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
-
-    Returns
-    -------
-    residual : ndarray, shape (m,)
-        n residuals of x, then n of y, then n of the angle, if the task has these targets.
-    jacobian : ndarray, shape (m, 11)
-        Derivatives with respect to `UNKNOWNS`.
-    rate : ndarray, shape (m,)
-        Derivatives with respect to the crank rotation at the residual's station.
-    """
-    n = normal.n
-    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
-    root = np.sqrt(normal.weights)
-    parts, jacobians, rates = [], [], []
-    if normal.points is not None:
-        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
-        coupler_path_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
-        for axis, wanted in enumerate((normal.points.real, normal.points.imag)):
-            parts.append(root * (out[axis] - wanted))
-            jacobians.append(root[:, None] * np.column_stack([jacobian[:10, axis].T, np.zeros(n)]))
-            # a rotation of the crank is a change of its phase
-            rates.append(root * jacobian[8, axis])
-    if normal.angle is not None:
-        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
-        link_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
-        which = 1 if normal.of_rocker else 0
-        turned = 0.0 if normal.of_rocker else q[7]
-        left = out[which] + turned + q[10] - normal.angle
-        own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
-        own[:, 7] += 0.0 if normal.of_rocker else 1.0
-        factor = normal.leverage * root
-        parts.append(factor * wrap_angles(left))
-        jacobians.append(factor[:, None] * own)
-        rates.append(factor * jacobian[8, which])
-    return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
-
-
-def sum_of_squares(normal: Normal, start: Start) -> float:
-    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite if the links cannot be joined."""
-    rotation = normal.rotation if start.rotation is None else start.rotation
-    assert rotation is not None
-    residual = residuals(normal, start.branch, start.q, rotation)[0]
-    value = float(residual @ residual)
-    return value if np.isfinite(value) else inf
-
-
-def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
-    """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian."""
-    free = np.nonzero(limits.high > limits.low)[0]
-    timed, n = normal.timed, normal.n
-    base = clip_to_bounds(start.q, limits.low, limits.high)
-    low, high = limits.low[free], limits.high[free]
-    x0 = base[free]
-    # strictly inside, as the method asks
-    x0 = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    rotation0 = normal.rotation if timed else start.rotation
-    if rotation0 is None:
-        raise InputError("the start of an untimed task needs the crank rotations of its stations")
-    if not timed:
-        x0 = np.append(x0, rotation0)
-        low, high = np.append(low, np.full(n, -inf)), np.append(high, np.full(n, inf))
-    size = len(free)
-    blocks = (normal.points is not None) * 2 + (normal.angle is not None)
-
-    def unpack(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        q = base.copy()
-        q[free] = x[:size]
-        return q, rotation0 if timed else x[size:]
-
-    def value(x: FloatArray) -> FloatArray:
-        found = residuals(normal, start.branch, *unpack(x))
-        # beyond the limit of assembly: residuals larger than any others, so that the step is shortened
-        return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
-
-    def derivative(x: FloatArray) -> FloatArray:
-        _, jacobian, rate = residuals(normal, start.branch, *unpack(x))
-        columns = jacobian[:, free]
-        if timed:
-            return columns
-        own = np.zeros((blocks * n, n))
-        for block in range(blocks):
-            own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
-        return np.hstack([columns, own])
-
-    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpack(x0))):
-        return Answer.for_unjoined_links(start)
-    result = least_squares(
-        value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
-    )
-    q, rotation = unpack(result.x)
-    ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
-    ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
-    ended = replace(start, q=q, rotation=None if timed else rotation)
-    quality = sum_of_squares(normal, ended)
-    return Answer(
-        start=replace(ended, quality=quality),
-        feasible=bool(np.isfinite(quality)) and ordered,
-        converged=bool(result.success),
-        violation=0.0 if ordered else inf,
-        worst="" if ordered else "order of the stations",
-        excess="",
-        status=str(result.message),
-        iterations=int(result.nfev),
-    )

@@ -1,19 +1,19 @@
 """Solve the nonlinear program of a synthesis by IPOPT, with exact derivatives from CasADi.
 
-The module `statement` states the program. This module converts a start into unknowns and parameters of the program and back,
-evaluates and solves the program, and checks whether the answer meets the constraints; if the pivot moves, also at the extremes
-of its motion.
+The module `statement` states the program. This module converts a linkage into a start of a search, a start into unknowns and
+parameters of the program, and back. It evaluates and solves the program, and checks whether the answer meets the constraints;
+if the pivot moves, also at the extremes of its motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from math import cos, inf, isfinite, pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,28 +21,239 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ...numerics import symbolic
-from ..linkage.linkage import BY_SHORTEST
+from ...numerics.fourier import FourierSeries
+from ..linkage.linkage import BY_SHORTEST, FiveBar, Linkage, SecondCrank, SliderCrank, SliderMotion, wrap_angles
+from ..result.solution import Solution, nearest_rotations
 from ..task.constraint import UNKNOWNS, half_planes
-from ..task.formula import convert_to_si, find_peaks
-from .start import Answer, Start, clip_to_bounds, distances_from_bounds, pivot_size
-from .statement import FURTHER, GRID, SOUGHT, Statement
+from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown
+from ..task.task import Normal
+from .statement import FURTHER, GRID, SOUGHT, Statement, convert_to_si, pivot_size
 
 FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
 #: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution. The greatest error
-#: of a linkage with a fixed pivot is minimised with adaptive small steps: monotone ones stall at a degenerate optimum.
+#: of a linkage with a fixed pivot is minimised with adaptive small steps: monotone ones stall at a degenerate optimum. So is a
+#: function in place of an error if larger steps leave the bounds, which the start keeps, and do not come back.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
     "least": {"mu_strategy": "adaptive"},
-    "worst, fixed": {"mu_strategy": "adaptive", "bound_push": 1e-8, "bound_frac": 1e-8},
+    "small": {"mu_strategy": "adaptive", "bound_push": 1e-8, "bound_frac": 1e-8},
     "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
 #: Limit of iterations of IPOPT: most optima are reached within a hundred, the others only after many.
 ITERATIONS = 250
+#: Initial amplitude of the motion of a pivot, relative to the ground link.
+AMPLITUDE = 0.1
 #: Tolerance of a constraint: units, rad, or a fraction of the bound.
 KEPT = 1e-7
 #: Margin of the bounds of the pivot's motion at its extremes, and the greatest number of times that extremes are updated.
 HELD, ROUNDS = 2e-7, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Dimensions and assembly of a linkage at which a search starts or ends, in normal form (see `Normal`).
+
+    Attributes
+    ----------
+    q : ndarray, shape (11,)
+        Values of `UNKNOWNS`.
+    branch : int
+        Assembly, as in `Linkage`.
+    pivot : ndarray
+        Unknowns of a moving pivot: guide angle and mean position, or length and phase of a second crank; then cosine and sine
+        coefficient of each harmonic.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations of the stations if they are unknown.
+    quality : float
+        Value of the objective, in the square of the length `Normal.unit`; for a greatest error, in `Normal.unit`.
+    given : bool
+        Whether the start is a guess, not a candidate of the scan.
+    linkage : type
+        Type of the linkage; a five-bar is a `Linkage` with a second crank in ``pivot``.
+    """
+
+    q: FloatArray
+    branch: int
+    quality: float = inf
+    given: bool = False
+    pivot: FloatArray = field(default_factory=lambda: np.empty(0))
+    rotation: FloatArray | None = None
+    linkage: type[Linkage] = Linkage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """Result of an optimisation: the linkage that it reached, as a `Start`, and whether it meets every constraint.
+
+    ``worst`` is the name of the constraint that is violated most. ``violation`` is the amount of this violation (units, rad, or
+    a fraction of the bound), and ``excess`` is the amount as text with its unit. ``status`` is the solver's message.
+    """
+
+    start: Start
+    feasible: bool
+    converged: bool
+    violation: float
+    worst: str
+    excess: str
+    status: str
+    iterations: int
+
+    @classmethod
+    def for_unjoined_links(cls, start: Start) -> Answer:
+        """Return an infeasible answer for a start whose links cannot be joined."""
+        return cls(
+            start=replace(start, quality=inf),
+            feasible=False,
+            converged=False,
+            violation=inf,
+            worst="loop closure",
+            excess="",
+            status="the links cannot be joined at the start",
+            iterations=0,
+        )
+
+
+def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the unknowns clipped to their bounds; angles outside their bounds are first shifted by whole turns."""
+    q = q.copy()
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    middle = 0.5 * (low[angles] + high[angles])
+    nearest = middle + wrap_angles(q[angles] - middle)
+    outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
+    q[angles] = np.where(outside, nearest, q[angles])
+    return np.clip(q, low, high)
+
+
+def distances_from_bounds(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
+    """Return by how much each unknown of a start lies outside its bounds (units, rad), shape (11,).
+
+    The value is 0 for an unknown that does not affect the task.
+    """
+    q = clip_to_bounds(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
+    off = np.abs(wrap_angles(q - start.q))
+    off[:7] = np.abs(q - start.q)[:7]
+    idle: tuple[str, ...] = () if normal.angle is not None else ("output_angle",)
+    if normal.of_rocker:
+        idle = ("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle")
+    off[[UNKNOWNS.index(name) for name in idle]] = 0.0
+    return off
+
+
+def make_linkage(
+    start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
+) -> Linkage:
+    """Build the linkage of a start, in SI; an angle is wrapped to [-pi, pi) if ``limits`` allow the wrapped angle."""
+    q = start.q.copy()
+    q[:7] *= normal.unit
+    q[0] += normal.origin.real
+    q[1] += normal.origin.imag
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    near = wrap_angles(q[angles])
+    if limits is not None:
+        outside = (near < limits.low[angles]) | (near > limits.high[angles])
+        near = np.where(outside, q[angles], near)
+    q[angles] = near
+    v = start.pivot
+    moved: SliderMotion | SecondCrank | None = None
+    if isinstance(pivot, SliderUnknown) and len(v):
+        cosines, sines = np.append(v[1], v[2::2]), np.append(0.0, v[3::2])
+        moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
+    elif isinstance(pivot, CrankUnknown) and len(v):
+        series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrap_angles(v[1])), series)
+    made: type[Linkage] = FiveBar if isinstance(moved, SecondCrank) else start.linkage
+    return made.from_vector(q, start.branch, pivot=moved)
+
+
+def make_start(
+    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
+) -> Start:
+    """Convert a linkage to a start.
+
+    The Fourier series of its pivot's motion is truncated, or padded with zeros, to the harmonics of ``pivot``. ``rotation`` has
+    the crank rotations of the stations, if the task does not give them.
+    """
+    q = np.append(linkage.vector, linkage.output_angle)
+    q[0] -= normal.origin.real
+    q[1] -= normal.origin.imag
+    q[:7] /= normal.unit
+    v = np.zeros(pivot_size(pivot))
+    if isinstance(pivot, SliderUnknown) and isinstance(linkage.pivot, SliderMotion):
+        series = linkage.pivot.series.to_order(pivot.harmonics)
+        v[0], v[1] = linkage.pivot.guide_angle, series.mean / normal.unit
+        v[2::2], v[3::2] = series.cos[1:] / normal.unit, series.sin[1:] / normal.unit
+    elif isinstance(pivot, CrankUnknown):
+        v[0] = pivot.length[0] / normal.unit
+        if isinstance(linkage.pivot, SecondCrank):
+            series = linkage.pivot.series.to_order(pivot.harmonics)
+            v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
+            v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
+    kind = SliderCrank if isinstance(linkage, SliderCrank) else Linkage
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
+
+
+def convert_to_start(given: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+    """Convert a linkage or solution to a start, with crank rotations for untimed stations.
+
+    These are the rotations of the solution, or else the rotations at which the linkage is nearest to the stations. Raises
+    InputError if the rotations are not known and the path is open: nearest rotations are found for closed paths only.
+    """
+    linkage, rotation = (given.linkage, given.evaluation.rotation) if isinstance(given, Solution) else (given, None)
+    if normal.timed:
+        rotation = None
+    elif rotation is None or len(rotation) != normal.n:
+        if normal.points is not None and normal.closed:
+            rotation = nearest_rotations(linkage, normal.places)
+        elif rotation is None:
+            raise InputError("a start for an open path needs the crank rotations of its stations")
+        else:
+            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
+    return make_start(linkage, normal, pivot, rotation)
+
+
+def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
+    """Draw random unknowns of a moving pivot, within the bounds of its stroke or length.
+
+    The coefficients of the harmonics decrease with their order.
+
+    Parameters
+    ----------
+    ground : float
+        Ground link, as a multiple of ``unit``.
+    unit : float
+        Size of the target (m).
+    """
+    orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
+    waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
+    if isinstance(unknown, CrankUnknown):
+        length = random.uniform(*unknown.length) / unit
+        return np.array([length, random.uniform(-pi, pi), *(0.3 * waves)])
+    low, high = unknown.guide_angle
+    # a guide turned by pi is the same guide
+    angle = low + min(high - low, pi) * random.random()
+    size = min(AMPLITUDE * ground, 0.25 * unknown.stroke / unit)
+    return np.array([angle, size * random.standard_normal(), *(size * waves)])
+
+
+def keep_distinct(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
+    """Return the first ``count`` items that are distinct from one another.
+
+    ``mark`` returns the vector that represents an item. Two items are distinct if a component of their vectors differs by at
+    least ``distance``.
+    """
+    chosen: list[Item] = []
+    marks: list[FloatArray] = []
+    for item in items:
+        own = mark(item)
+        if any(np.abs(own - other).max() < distance for other in marks):
+            continue
+        marks.append(own)
+        chosen.append(item)
+        if len(chosen) == count:
+            break
+    return chosen
 
 
 class Program(Statement):
@@ -111,13 +322,11 @@ class Program(Statement):
         place = casadi.vertcat(*self._point(first + share * (last - first)))
         return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
-    def _solver(self, iterations: int, near: bool) -> Any:
-        """Return an IPOPT solver with a limit of iterations; ``near`` if the start is close to an optimum."""
-        if (iterations, near) in self._solvers:
-            return self._solvers[iterations, near]
-        fixed = self.objective == "worst" and self.pivot is None
-        manner = "worst" if near else "worst, fixed" if fixed else self.objective
-        self._solvers[iterations, near] = symbolic.ipopt(
+    def _solver(self, iterations: int, manner: str) -> Any:
+        """Return an IPOPT solver with a limit of iterations and a strategy, a key of `FOLLOWING`."""
+        if (iterations, manner) in self._solvers:
+            return self._solvers[iterations, manner]
+        self._solvers[iterations, manner] = symbolic.ipopt(
             "synthesis",
             self._nlp,
             max_iter=iterations,
@@ -128,7 +337,7 @@ class Program(Statement):
             bound_relax_factor=0.0,
             **FOLLOWING[manner],
         )
-        return self._solvers[iterations, near]
+        return self._solvers[iterations, manner]
 
     def nearest_triangles(self, q: FloatArray) -> list[list[int]]:
         """Return, for each region, the indices of its triangles, the nearest to the pivot first."""
@@ -217,6 +426,7 @@ class Program(Statement):
         iterations: int = ITERATIONS,
         pieces: Sequence[int] | None = None,
         places: Sequence[FloatArray] | None = None,
+        small: bool = False,
     ) -> Answer:
         """Solve the program from a start.
 
@@ -232,11 +442,14 @@ class Program(Statement):
         places : sequence of ndarray, optional
             Crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed. Without these rotations the
             bounds are imposed on a grid, with a margin that guarantees the bounds everywhere.
+        small : bool
+            Whether the steps are small from the beginning.
         """
         z0, parameters = self.unknowns_and_parameters(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.evaluate(z0, parameters)):
             return Answer.for_unjoined_links(start)
-        solver = self._solver(iterations, places is not None)
+        small = small or (self.objective == "worst" and self.pivot is None)
+        solver = self._solver(iterations, "worst" if places is not None else "small" if small else self.objective)
         result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
         stats = solver.stats()
         answer = self.judge_unknowns(np.asarray(result["x"]).ravel(), parameters, start)
@@ -344,10 +557,10 @@ class Program(Statement):
         return found + self._peak_rotations(start)
 
     def _peak_rotations(self, start: Start) -> list[FloatArray]:
-        """Return the peaks of each `RotationRequirement`: crank rotations and curvatures, as `find_peaks` returns them."""
+        """Return the peaks of each `RotationRequirement`, as its method `find_peaks` returns them."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = convert_to_si(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
-        return [find_peaks(along, p, FURTHER) for along, _ in self._along_functions]
+        return [along.find_peaks(p, FURTHER) for along, _ in self._along_functions]
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:

@@ -26,12 +26,11 @@ from scipy.stats import qmc
 
 from ...run import show_progress
 from ..linkage.kernels import many_directions, match_windows
-from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
-from ..linkage.pivot import Kind
+from ..linkage.linkage import BY_SHORTEST, Kind, Linkage, SliderCrank
 from ..task.constraint import TURNING, InfeasibleError
 from ..task.limits import Limits
 from ..task.task import Normal
-from .start import Start, keep_distinct
+from .program import Start, keep_distinct
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

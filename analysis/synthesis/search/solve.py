@@ -17,9 +17,9 @@ from linkwork.errors import InputError, Interrupted
 from ...display import NotebookResult, format_count
 from ...files import write_csv
 from ...units import Amount, in_si
-from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
-from ..linkage.linkage import UNITS, Linkage
-from ..linkage.pivot import Kind, PivotUnknown
+from ..exact.burmester import guidance
+from ..exact.generation import QuickReturn, QuickSwing, function_generators, quick_returns
+from ..linkage.linkage import UNITS, Kind, Linkage
 from ..result.report import solution_columns
 from ..result.solution import Solution, group_similar, rank_solutions
 from ..task.constraint import (
@@ -31,11 +31,11 @@ from ..task.constraint import (
     LargestLink,
     LeastTransmission,
     MaxPinForce,
-    Stroke,
 )
 from ..task.limits import (
     GEARS,
     Limits,
+    PivotUnknown,
     check_bounds,
     check_task,
     limits_by_kind,
@@ -43,19 +43,20 @@ from ..task.limits import (
     place_as_task,
     usual_kinds,
 )
-from ..task.task import Normal, Task, UntimedPath, normal_form, replace_weights
-from .polish import EXACT, Polished, distinct_answers, feasible_answers, infeasible_error, polish
-from .scan import scan
-from .start import (
+from ..task.task import Motion, Normal, PrecisionPoints, RockerFunction, Task, UntimedPath, normal_form
+from .polish import (
+    EXACT,
     QUICK_SEARCH,
     USUAL_SEARCH,
-    Answer,
+    Polished,
     Search,
-    closed_form_solutions,
-    convert_to_start,
-    make_linkage,
-    random_pivot,
+    distinct_answers,
+    feasible_answers,
+    infeasible_error,
+    polish,
 )
+from .program import Answer, convert_to_start, make_linkage, random_pivot
+from .scan import scan
 
 #: Number of stations of an untimed path with a moving pivot: more than with a fixed one, as harmonics cause waves in the curve.
 STATIONS = 144
@@ -70,7 +71,6 @@ class Synthesis(NotebookResult):
     Attributes
     ----------
     task : Task
-        The task with the weights of the search.
     solutions : tuple of Solution
         Solutions without defects come first, then in order of error. A solution also represents its mirror images and near
         copies, which are its ``variants``.
@@ -138,8 +138,7 @@ class SynthesisInterrupted(Interrupted):
 def synthesize(
     task: Task,
     bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
-    constraints: Sequence[Constraint | Stroke] = USUAL,
-    weights: ArrayLike | None = None,
+    constraints: Sequence[Constraint] = USUAL,
     *,
     pivot: PivotUnknown | None = None,
     guesses: Sequence[Solution] = (),
@@ -162,8 +161,6 @@ def synthesize(
         and the other links are at most 0.5 m.
     constraints : sequence
         See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
-    weights : array_like, optional
-        Weights that replace those of the task, one per target.
     pivot : SliderUnknown or CrankUnknown, optional
         Unknown motion of the rocker pivot, which is found together with the links.
     guesses : sequence of Solution
@@ -203,7 +200,6 @@ def synthesize(
     if search.starts < 1:
         raise InputError(f"{search.starts} starts: there must be at least one")
     begun = perf_counter()
-    task = replace_weights(task, weights)
     kinds = usual_kinds(task) if kinds is None else kinds
     check_arguments(task, kinds, bounds=bounds, pivot=pivot, guesses=guesses, gears=gears)
     if isinstance(task, QuickReturn | QuickSwing):
@@ -244,6 +240,22 @@ def synthesize(
         raise refused
     together = found[0] if len(found) == 1 else _merge_kinds(found, search.solutions)
     return _make_result(task, together, done, total, search, begun)
+
+
+def closed_form_solutions(task: Task) -> tuple[Solution, ...]:
+    """Return the four-bars without defects that do a task exactly, found in closed form; empty if there are none.
+
+    Closed forms exist for untimed poses and for rocker functions, if there are as many targets as unknowns.
+    """
+    try:
+        if isinstance(task, RockerFunction):
+            return function_generators(task).sound
+        if isinstance(task, PrecisionPoints | Motion) and task.angle is not None and task.rotation is None:
+            return tuple(s for s in guidance(task).solutions if s.verdicts.sound)
+    except InputError:
+        # not as many targets as unknowns, or targets that depend on one another
+        pass
+    return ()
 
 
 def check_arguments(
@@ -542,10 +554,8 @@ def trade_off(
     over: Literal["size", "transmission", "pin-force"],
     limits: ArrayLike,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    constraints: Sequence[Constraint | Stroke] = USUAL,
-    weights: ArrayLike | None = None,
+    constraints: Sequence[Constraint] = USUAL,
     *,
-    pivot: PivotUnknown | None = None,
     search: Search = QUICK_SEARCH,
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
@@ -562,7 +572,7 @@ def trade_off(
     over : "size", "transmission" or "pin-force"
     limits : array_like, shape (n,)
         Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
-    bounds, constraints, weights, pivot, kinds, gears
+    bounds, constraints, kinds, gears
         See `synthesize`; the limit replaces a constraint of the same kind. For pin forces a `MaxPinForce` among the
         constraints gives masses, load and speed.
     search : Search
@@ -577,7 +587,7 @@ def trade_off(
     """
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
-    check_arguments(task, kinds, bounds=bounds, pivot=pivot, gears=gears, over=over)
+    check_arguments(task, kinds, bounds=bounds, gears=gears, over=over)
     values = np.array(limits, dtype=float)
     kind = {"size": LargestLink, "transmission": LeastTransmission, "pin-force": MaxPinForce}[over]
     running = next((c for c in constraints if isinstance(c, MaxPinForce)), MaxPinForce(force=1.0))
@@ -594,8 +604,8 @@ def trade_off(
 
     def best(k: int, guesses: Sequence[Solution], back: bool) -> tuple[Solution, ...]:
         how = replace(first, starts=1, candidates=1 << 8) if back else first
-        which: dict[str, Any] = {"pivot": pivot, "kinds": kinds, "gears": gears}
-        return synthesize(task, bounds, (*rest, limit(k)), weights, guesses=guesses, search=how, **which).solutions
+        asked = (*rest, limit(k))
+        return synthesize(task, bounds, asked, guesses=guesses, search=how, kinds=kinds, gears=gears).solutions
 
     found, done = solve_both_ways(order.tolist(), best)
     result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))

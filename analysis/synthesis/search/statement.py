@@ -7,6 +7,7 @@ direction of crank rotation, the triangle of a pivot's region, and the shortest 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from math import acos, cos, degrees, hypot, inf, isfinite, pi
 from types import SimpleNamespace
@@ -15,14 +16,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.errors import InputError
+
 from ...numerics import symbolic
-from ..linkage.linkage import Linkage
-from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, gear_turns
+from ..linkage.linkage import Linkage, gear_turns
 from ..task.constraint import TURNING, UNKNOWNS, MinimisedFunction, Require, RotationRequirement
-from ..task.formula import convert_to_si, trace_requirement
-from ..task.limits import Limits
+from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown
 from ..task.task import Normal, turn
-from .start import pivot_bounds
 
 FloatArray = NDArray[np.float64]
 Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
@@ -45,6 +45,63 @@ SOUGHT = ("least", "least curve")
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
 #: Number of further rotations at which a `RotationRequirement` is bounded: those of its peaks in the previous solution.
 FURTHER = 8
+
+
+def convert_to_si(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
+    """Convert dimensions from normal form to SI, the units of users' functions.
+
+    ``unit`` is the size of the target and ``origin`` its centre (m); see `Normal`.
+    """
+    values = dict(vars(p))
+    for name in UNKNOWNS[:7]:
+        values[name] = unit * values[name]
+    values["pivot_x"], values["pivot_y"] = values["pivot_x"] + origin.real, values["pivot_y"] + origin.imag
+    return SimpleNamespace(**values)
+
+
+def trace_requirement(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
+    """Evaluate a required function with CasADi symbols.
+
+    ``values`` has the dimensions; ``rotation`` are the crank rotations, given only for a `RotationRequirement`.
+
+    Raises InputError if the function branches on its argument, or calls a function that does not take CasADi's symbols.
+    """
+    casadi = symbolic.library()
+    try:
+        with warnings.catch_warnings():
+            # CasADi's symbols take NumPy's functions, and say so
+            warnings.simplefilter("ignore", FutureWarning)
+            value = casadi.SX(require.function(values, *rotation))
+    except Exception as error:
+        raise InputError(
+            f"{require.name} cannot be traced ({type(error).__name__}: {error}): it must be arithmetic and functions of NumPy, "
+            "without branches"
+        ) from error
+    if not rotation and (value.numel() != 1 or value.is_constant()):
+        # a function that converts a symbol to a float loses the symbol, and its value is NaN
+        raise InputError(
+            f"{require.name} cannot be traced (its value is {value}): it must be one number from the dimensions"
+        )
+    return value
+
+
+def pivot_size(pivot: PivotUnknown | None) -> int:
+    """Return how many unknowns a moving pivot has."""
+    if pivot is None:
+        return 0
+    return 2 + 2 * pivot.harmonics
+
+
+def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the greatest values of the unknowns of a moving pivot; ``unit`` is the target's size (m)."""
+    if pivot is None:
+        return np.empty(0), np.empty(0)
+    low, high = np.full(pivot_size(pivot), -inf), np.full(pivot_size(pivot), inf)
+    if isinstance(pivot, SliderUnknown):
+        low[0], high[0] = pivot.guide_angle
+    else:
+        low[0], high[0] = pivot.length[0] / unit, pivot.length[1] / unit
+    return low, high
 
 
 class Label(NamedTuple):
@@ -83,8 +140,8 @@ class Statement:
     objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
         "squares": minimise the weighted squared errors. "worst": minimise the greatest weighted error, an unknown that bounds
         all errors. "transmission": meet the stations exactly and maximise the least transmission angle. "curve": only the
-        constraints of a path, for `refine`, which compares whole curves without stations; the only unknown crank rotations are
-        the ends of an open path and of its straight part. "least" and "least curve": minimise `Limits.least` instead of an
+        constraints of a path, for `Refinement`, which compares curves without stations; the only unknown rotations are the
+        ends of an open path and of its straight part. "least" and "least curve": minimise `Limits.least` instead of an
         error, with and without stations.
     exact : bool
         Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.settle_extremes`; False makes a first
@@ -122,7 +179,7 @@ class Statement:
         self._along_functions: list[tuple[RotationRequirement, Any]] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
-        self._solvers: dict[tuple[int, bool], Any] = {}
+        self._solvers: dict[tuple[int, str], Any] = {}
         self._share = SX.sym("share")
         # parameters: branch, direction, magnitude of the errors, rows of Grashof's type, half-planes of the regions
         branch, direction, size = (SX.sym(name) for name in ("branch", "direction", "size"))
@@ -155,7 +212,7 @@ class Statement:
             value = self._trace(require, p) / require.scale
             self._constrain(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
         if isinstance(pivot, SliderUnknown):
-            quality = quality + self._constrain_slider(pivot, p.ground_length, v)
+            self._constrain_slider(pivot, p.ground_length, v)
         if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
             self._bound_motion(
                 lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
@@ -492,11 +549,8 @@ class Statement:
         casadi = self._casadi
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
-    def _constrain_slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
-        """Add the constraints on the slider's motion; return the smoothness term of the objective, or 0 without one.
-
-        ``ground`` is the ground link, ``v`` the unknowns of the motion.
-        """
+    def _constrain_slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> None:
+        """Add the constraints on the slider's motion; ``ground`` is the ground link, ``v`` has the unknowns of the motion."""
         casadi, unit = self._casadi, self.normal.unit
 
         def position(x: Any) -> Any:
@@ -521,10 +575,6 @@ class Statement:
             self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
         self._bound_derivative(v, 1, pivot.speed, "slider speed", "mm/rad")
         self._bound_derivative(v, 2, pivot.acceleration, "slider acceleration", "mm/rad2")
-        if not pivot.smoothness:
-            return 0.0
-        x = casadi.DM(turn(max(GRID, 16 * pivot.harmonics)))
-        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _bound_derivative(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
         """Bound the magnitude of the slider's speed (order 1, m/rad) or acceleration (order 2, m/rad2) by ``bound``."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf, isfinite, pi, radians
+from functools import partial
+from math import cos, inf, isfinite, pi, radians
+from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -15,8 +17,8 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from ...numerics import symbolic
 from ...units import Amount, in_si, quantity
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import Linkage
-from ..linkage.machine import PINS, USUAL_MAKE, MachineSpec, pin_functions
+from ..linkage.linkage import Linkage, SliderCrank
+from ..linkage.machine import PINS, POSITIONS, USUAL_MAKE, MachineSpec, pin_functions
 from .task import Normal
 
 FloatArray = NDArray[np.float64]
@@ -25,6 +27,14 @@ GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-cran
 UNKNOWNS = (*PLACES, "output_angle")
 #: Name of the additional dimension of a geared five-bar.
 SECOND_LENGTH = "second_crank_length"
+#: Number of rotations at which a `RotationRequirement` is bounded from the beginning.
+GRID = 48
+#: Number of rotations at which a function is evaluated to find its greatest values.
+DENSE = 721
+#: Rotation by which the search for peaks extends a full turn at either end (rad).
+BEYOND = 0.02
+#: Two collinear links: one extends the other, or lies over it.
+InLine = Literal["stretched", "folded"]
 #: Least transmission angle at which a crank still counts as turning fully (rad).
 TURNING = 0.002
 
@@ -154,8 +164,8 @@ class Require:
     Attributes
     ----------
     function : callable
-        Function of a namespace with the dimensions of `Linkage` by name (SI). It may use arithmetic and the elementary
-        functions of `math` or NumPy, but no branches. The search traces the function with symbols, to differentiate it exactly.
+        Function of a namespace with the dimensions of `Linkage` by name (SI). The search calls it with CasADi's symbols, to
+        differentiate it exactly: it may use arithmetic and elementary functions of NumPy, but no branches.
     equal : bool
         Whether the function must be zero, instead of at most zero.
     name : str
@@ -164,8 +174,6 @@ class Require:
         Magnitude of the function's values, by which a search divides them.
     unit : str
         Unit of the values in messages.
-    symbolic : bool
-        Whether the function accepts CasADi symbols and numbers without tracing; it may then have several values.
     """
 
     function: Callable[..., Any]
@@ -173,7 +181,6 @@ class Require:
     name: str = "required function"
     scale: float = 1.0
     unit: str = ""
-    symbolic: bool = False
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -198,6 +205,43 @@ class RotationRequirement(Require):
 
     rotation: FloatArray
     ends: tuple[float, float] | None = None
+
+    @classmethod
+    def between(cls, ends: tuple[float, float], **more: Any) -> RotationRequirement:
+        """Bound a function between two crank rotations (rad); ``more`` are further fields, such as the function."""
+        turn = ends[1] - ends[0] >= 2.0 * pi
+        # beyond a full turn, to find a peak at its end
+        over = BEYOND if turn else 0.0
+        return cls(rotation=np.linspace(*ends, GRID, endpoint=not turn), ends=(ends[0] - over, ends[1] + over), **more)
+
+    def find_peaks(self, values: SimpleNamespace, count: int) -> FloatArray:
+        """Find the ``count`` highest peaks of the function, for given dimensions, and their curvatures.
+
+        Returns
+        -------
+        ndarray, shape (count, 1 + n)
+            A row for each peak, the highest first; the ends of the range count as peaks. The first column is the crank rotation
+            (rad). Then follows, for each of the n values of the function, -1/2 divided by the second derivative of this value,
+            or 0 if this value has no peak there; with the slope it gives the height of a nearby peak. If there are fewer peaks,
+            the first row is repeated.
+        """
+        assert self.ends is not None
+        rotation = np.linspace(*self.ends, DENSE)
+        columns = np.asarray(self.function(values, symbolic.library().DM(rotation))).reshape(DENSE, -1)
+        step, none = rotation[1] - rotation[0], [0.0] * columns.shape[1]
+        found: list[tuple[float, list[float]]] = []
+        for n, row in enumerate(np.nan_to_num(columns, nan=-np.inf).T):
+            inner = row[1:-1]
+            for k in np.nonzero((inner >= row[:-2]) & (inner > row[2:]) & np.isfinite(row[:-2] + row[2:]))[0]:
+                before, now, after = row[k : k + 3]
+                # the vertex of the parabola through three values
+                curved = 2.0 * now - before - after
+                off = 0.5 * (after - before) / curved
+                bends = [*none[:n], 0.5 * step**2 / curved, *none[n + 1 :]]
+                found.append((now + 0.25 * off * (after - before), [rotation[k + 1] + off * step, *bends]))
+            found += [(row[end], [rotation[end], *none]) for end in (0, -1)]
+        places = [place for _, place in sorted(found, reverse=True)[:count]]
+        return np.array(places + places[:1] * (count - len(places)))
 
 
 class RotationRange(NamedTuple):
@@ -255,8 +299,10 @@ class Demand:
     """A constraint that is expressed by functions of the dimensions that must be at most zero."""
 
     __slots__ = ()
-    #: Grashof type that the constraint requires.
+    #: Grashof type that the constraint requires of a four-bar.
     grashof: ClassVar[GrashofType | None] = None
+    #: Whether the crank must turn fully.
+    turns: ClassVar[bool] = False
     #: Whether the constraint excludes a full turn of the crank.
     stops: ClassVar[bool] = False
     #: Whether the constraint is an objective that replaces the error.
@@ -289,6 +335,7 @@ class TimeRatio(Demand):
     """
 
     grashof: ClassVar[GrashofType | None] = "crank-rocker"
+    turns: ClassVar[bool] = True
 
     least: float = 1.0
     greatest: float = inf
@@ -298,45 +345,32 @@ class TimeRatio(Demand):
             raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the functions of the dimensions that must be at most zero."""
-
-        def differs(d: Any) -> Any:
-            # directions of C from A with crank and coupler in line, by the law of cosines
-            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
-            stretched, folded = ((l1**2 + r**2 - l4**2) / (2.0 * l1 * r) for r in (l3 + l2, l3 - l2))
-            angles = [np.arctan2(np.sqrt(np.maximum(1.0 - c**2, 1e-12)), c) for c in (stretched, folded)]
-            return angles[1] - angles[0]
-
-        def advance(ratio: float) -> float:
-            return pi * (ratio - 1.0) / (ratio + 1.0)
-
-        found = []
-        if self.least > 1.0:
-            low = advance(self.least)
-            found.append(Require(function=lambda d: low**2 - differs(d) ** 2, name="least time ratio"))
-        if isfinite(self.greatest):
-            high = advance(self.greatest)
-            found.append(Require(function=lambda d: differs(d) ** 2 - high**2, name="greatest time ratio"))
-        return tuple(found)
+        low, high = crank_advance(self.least), crank_advance(self.greatest)
+        if way.linkage is SliderCrank:
+            below, above = (lambda d: low - advance(d)), (lambda d: advance(d) - high)
+        else:
+            below, above = (lambda d: low**2 - swing_advance(d) ** 2), (lambda d: swing_advance(d) ** 2 - high**2)
+        found = [Require(function=below, name="least time ratio")] if self.least > 1.0 else []
+        return (*found, *([Require(function=above, name="greatest time ratio")] if isfinite(self.greatest) else []))
 
 
-Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
-#: Default constraints: a least transmission angle of 40 degrees over a full turn.
-USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
+def crank_advance(ratio: float) -> float:
+    """Return the crank rotation during the slow part of a turn minus half a turn (rad), for a time ratio."""
+    return pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi
 
 
-def _constraint_names() -> list[str]:
-    """Return the class names of all constraints."""
-    found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
-    while below:
-        below = [kind for one in below for kind in one.__subclasses__()]
-        found += [kind.__name__ for kind in below if not kind.__name__.startswith("_")]
-    return list(dict.fromkeys(found))
+def swing_advance(d: Any) -> Any:
+    """Return plus or minus the `crank_advance` of a crank-rocker with the dimensions d, which may be numbers or symbols."""
+    l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+    # directions of C from A with crank and coupler in line, by the law of cosines
+    stretched, folded = ((l1**2 + r**2 - l4**2) / (2.0 * l1 * r) for r in (l3 + l2, l3 - l2))
+    angles = [np.arctan2(np.sqrt(np.maximum(1.0 - c**2, 1e-12)), c) for c in (stretched, folded)]
+    return angles[1] - angles[0]
 
 
 @in_si(least="m", greatest="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stroke:
+class Stroke(Demand):
     """Constraint: the crank of a slider-crank turns fully, and the stroke of its slider is within bounds.
 
     Attributes
@@ -345,6 +379,8 @@ class Stroke:
         Bounds of the stroke (m).
     """
 
+    turns: ClassVar[bool] = True
+
     least: Amount = 0.0
     greatest: Amount = inf
 
@@ -352,16 +388,18 @@ class Stroke:
         if not (0.0 <= self.least <= self.greatest and self.greatest > 0.0 and isfinite(self.least)):
             raise ParameterError("stroke", (self.least, self.greatest), "be two lengths in order (m)")
 
-    def requires(self) -> tuple[Require, ...]:
-        """Return the functions of the dimensions that must be at most zero."""
-        found = []
-        if self.least > 0.0:
-            low = self.least
-            found.append(Require(function=lambda d: low - stroke(d), name="least stroke", scale=low, unit="m"))
-        if isfinite(self.greatest):
-            high = self.greatest
-            found.append(Require(function=lambda d: stroke(d) - high, name="greatest stroke", scale=high, unit="m"))
-        return tuple(found)
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
+        low, high = self.least, self.greatest
+        least = Require(function=lambda d: low - stroke(d), name="least stroke", scale=low or 1.0, unit="m")
+        if not isfinite(high):
+            return (least,) if low > 0.0 else ()
+        greatest = Require(function=lambda d: stroke(d) - high, name="greatest stroke", scale=high, unit="m")
+        return (least, greatest) if low > 0.0 else (greatest,)
+
+
+Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
+#: Default constraints: a least transmission angle of 40 degrees over a full turn.
+USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
 
 def stroke(d: Any) -> Any:
@@ -381,28 +419,19 @@ def advance(d: Any) -> Any:
     return angles[0] - angles[1]
 
 
-def _slider_time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
-    """Return the constraints on the time ratio of a slider-crank, (pi + advance)/(pi - advance)."""
-    low, high = (
-        pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)
-    )
-    found = [Require(function=lambda d: low - advance(d), name="least time ratio")] if asked.least > 1.0 else []
-    if isfinite(asked.greatest):
-        found.append(Require(function=lambda d: advance(d) - high, name="greatest time ratio"))
-    return tuple(found)
-
-
-def _check_pins(pins: str) -> None:
-    if not pins or not set(pins) <= set(PINS):
-        raise ParameterError("pins", pins, "be some of the letters ABCD")
-
-
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Forces(Demand):
-    """Base class of the constraints on pin forces."""
+    """Base class of the constraints on pin forces; ``pins`` has the letters of the pins whose forces count, of "ABCD".
 
-    __slots__ = ()
-    make: MachineSpec
-    pins: str
+    ``make`` has masses, gravity, load, and the constant speed of the crank.
+    """
+
+    make: MachineSpec = USUAL_MAKE
+    pins: str = PINS
+
+    def __post_init__(self) -> None:
+        if not self.pins or not set(self.pins) <= set(PINS):
+            raise ParameterError("pins", self.pins, "be some of the letters ABCD")
 
     def pin_force_function(self, way: RotationRange) -> RotationRequirement:
         """Return a function of dimensions and crank rotations: the magnitudes of the pin forces (N), with a column per pin."""
@@ -416,14 +445,7 @@ class _Forces(Demand):
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))
 
-        return RotationRequirement(
-            function=magnitudes,
-            name="force on the pins",
-            unit="N",
-            rotation=even_rotations(ends),
-            ends=search_range(ends),
-            symbolic=True,
-        )
+        return RotationRequirement.between(ends, function=magnitudes, name="force on the pins", unit="N")
 
 
 @in_si(force="N")
@@ -435,23 +457,18 @@ class MaxPinForce(_Forces):
     ----------
     force : float
         Greatest force (N).
-    make : MachineSpec
-        Masses, gravity, load, and the constant speed of the crank.
-    pins : str
-        Letters of the pins whose forces count, of "ABCD".
+    make, pins
+        Masses, gravity, load and speed; letters of the pins whose forces count, of "ABCD".
     """
 
     force: Amount
-    make: MachineSpec = USUAL_MAKE
-    pins: str = PINS
 
     def __post_init__(self) -> None:
         if not (isfinite(self.force) and self.force > 0.0):
             raise ParameterError("greatest pin force", self.force, "be a finite number greater than zero (N)")
-        _check_pins(self.pins)
+        _Forces.__post_init__(self)
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the functions of dimensions and crank rotation that must be at most zero."""
         forces = self.pin_force_function(way)
 
         def excess(d: Any, rotation: Any) -> Any:
@@ -468,27 +485,18 @@ class LeastPinForce(_Forces):
     ----------
     error : float or str
         Bound of the greatest error, as defined by the objective "worst" (m; for a rocker function rad).
-    make : MachineSpec
-        Masses, gravity, load, and the constant speed of the crank.
-    pins : str
-        Letters of the pins whose forces count, of "ABCD".
+    make, pins
+        Masses, gravity, load and speed; letters of the pins whose forces count, of "ABCD".
     """
 
     seeks: ClassVar[bool] = True
 
     error: Amount
-    make: MachineSpec = USUAL_MAKE
-    pins: str = PINS
-
-    def __post_init__(self) -> None:
-        _check_pins(self.pins)
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return no required functions, since the pin force is the objective."""
         return ()
 
     def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction:
-        """Return the objective: minimise the greatest pin force while the greatest error is within its bound."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
@@ -497,21 +505,195 @@ class LeastPinForce(_Forces):
 
 #: The constraints on pin forces.
 FORCES = (MaxPinForce, LeastPinForce)
-#: Number of rotations at which a `RotationRequirement` is bounded from the beginning.
-GRID = 48
-#: Rotation by which the search for peaks extends a full turn at either end (rad).
-BEYOND = 0.02
 
 
-# Rotations at which functions are bounded
+# Limit positions and mechanical advantage
 
 
-def even_rotations(ends: tuple[float, float]) -> FloatArray:
-    """Return evenly spaced rotations between two angles, without the end of a full turn (rad)."""
-    return np.linspace(*ends, GRID, endpoint=ends[1] - ends[0] < 2.0 * pi)
+def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
+    """Return the ends of a range of crank rotations (rad) from two numbers, or from one number for both ends.
+
+    Raises ParameterError if the range is longer than ``longest``.
+    """
+    try:
+        low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
+    except (TypeError, ValueError):
+        raise ParameterError(name, value, "be a crank rotation, or the two ends of a range (rad)") from None
+    if not (isfinite(low) and isfinite(high) and low <= high < low + longest):
+        raise ParameterError(name, value, f"be crank rotations in order, less than {longest:.4g} rad apart")
+    return low, high
 
 
-def search_range(ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the range in which peaks are sought (rad): a full turn is extended a little to find a peak at its end."""
-    over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
-    return ends[0] - over, ends[1] + over
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MechanicalAdvantage(Demand):
+    """Constraint: the magnitude of the mechanical advantage is within bounds; see `mechanical_advantage`.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds of the magnitude.
+    at : array_like, optional
+        Crank rotations at which the bounds hold (rad). By default they hold everywhere: over a turn or, if the crank need not
+        turn fully, from the first to the last of the task's rotations.
+    """
+
+    least: float = 0.0
+    greatest: float = inf
+    at: Any = None
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.least <= self.greatest and isfinite(self.least) and self.greatest > 0.0):
+            raise ParameterError(
+                "mechanical advantage", (self.least, self.greatest), "be two numbers in order, 0 or above"
+            )
+        if self.at is not None:
+            at = np.atleast_1d(np.asarray(self.at, dtype=float))
+            if at.ndim != 1 or not len(at) or not np.isfinite(at).all():
+                raise ParameterError("rotations of the mechanical advantage", self.at, "be finite numbers (rad)")
+            object.__setattr__(self, "at", at)
+
+    @property
+    def excludes_rest(self) -> bool:
+        """Return whether the greatest advantage is bounded everywhere: it is infinite in a dead centre."""
+        return self.at is None and isfinite(self.greatest)
+
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
+        made: Callable[..., RotationRequirement]
+        if self.at is None:
+            made, turn = partial(RotationRequirement.between, way.ends("mechanical advantage")), way.turn
+        else:
+            way.timed("mechanical advantage at crank rotations")
+            made, turn = partial(RotationRequirement, rotation=self.at), False
+
+        def speed(d: Any, rotation: Any) -> Any:
+            casadi = symbolic.library()
+            th2 = rotation if turn else rotation + d.crank_phase
+            c2, s2 = casadi.cos(th2), casadi.sin(th2)
+            l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
+            g = way.linkage.closure()(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            return POSITIONS[way.linkage.kind].speed(g, l2, l3, l4)
+
+        def slow(d: Any, rotation: Any) -> Any:
+            both = self.least * speed(d, rotation)
+            return symbolic.library().horzcat(both - 1.0, -both - 1.0)
+
+        def fast(d: Any, rotation: Any) -> Any:
+            return 1.0 - (self.greatest * speed(d, rotation)) ** 2
+
+        asked = {"least": (slow, self.least > 0.0), "greatest": (fast, isfinite(self.greatest))}
+        return tuple(
+            made(function=f, name=f"{which} mechanical advantage") for which, (f, wanted) in asked.items() if wanted
+        )
+
+
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LimitPosition(Demand):
+    """Base class of `DeadCentre` and `Toggle`, which describe its attributes."""
+
+    _name: ClassVar[str]
+
+    at: Amount
+    position: InLine = "stretched"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", _rotations(self.at, f"rotation of a {self._name}", pi))
+        if self.position not in get_args(InLine):
+            raise ParameterError("position", self.position, f"be one of {', '.join(get_args(InLine))}")
+
+    def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
+        return Require(function=function, equal=equal, name=f"{self.position} {self._name}")
+
+    def _require_sign_change(self, way: RotationRange, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
+        """Return constraints by which ``distance`` has a zero, the limit position, within the range: its sign changes there."""
+        way.timed(f"a {self._name} at crank rotations")
+        low, high = self.at
+        if low == high:
+            return (self._require(lambda d: distance(d, low), equal=True),)
+        return (self._require(lambda d: distance(d, low) * distance(d, high)),)
+
+
+class DeadCentre(_LimitPosition):
+    """Constraint: a dead centre, with crank and coupler collinear, is at a crank rotation or within a range of rotations.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        Crank rotation, or range of crank rotations, counted as in the task (rad).
+    position : "stretched" or "folded"
+        The coupler extends the crank, or lies over it.
+    """
+
+    __slots__ = ()
+    _name: ClassVar[str] = "dead centre"
+
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
+        stretched = self.position == "stretched"
+
+        def closes(d: Any, rotation: float) -> Any:
+            reach = d.coupler_length + d.crank_length if stretched else d.coupler_length - d.crank_length
+            # A -> C points along the crank, or against it
+            c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
+            return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
+
+        def opposite(d: Any, rotation: float) -> Any:
+            s = symbolic.library().sin(rotation + d.crank_phase)
+            return -d.branch * s if stretched else d.branch * s
+
+        sides = [self._require(partial(opposite, rotation=end)) for end in dict.fromkeys(self.at)]
+        return (*self._require_sign_change(way, closes), *sides)
+
+
+class Toggle(_LimitPosition):
+    """Constraint, as `DeadCentre`: a toggle, in which the crank can turn no further, is at a rotation or in a range of them.
+
+    In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
+
+    Attributes
+    ----------
+    position : "stretched" or "folded"
+        The coupler extends the rocker, or lies over it.
+    at : float or (float, float)
+        Crank rotation, or range of crank rotations, as of a dead centre (rad).
+    """
+
+    __slots__ = ()
+    _name: ClassVar[str] = "toggle"
+    stops: ClassVar[bool] = True
+
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
+        def closes(d: Any, rotation: float) -> Any:
+            c = symbolic.library().cos(rotation + d.crank_phase)
+            return POSITIONS[way.linkage.kind].toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
+
+        return self._require_sign_change(way, closes)
+
+
+@in_si(between="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoToggle(Demand):
+    """Constraint: there is no toggle between two crank rotations, and the links stay joined.
+
+    Attributes
+    ----------
+    between : (float, float)
+        Crank rotations, counted as in the task (rad).
+    """
+
+    between: tuple[Amount, Amount]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "between", _rotations(self.between, "rotations without a toggle"))
+
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
+        way.timed("a range of crank rotations without a toggle")
+
+        def excess(d: Any, rotation: Any) -> Any:
+            casadi, kind, cosine = symbolic.library(), way.linkage, cos(TURNING)
+            th2, l2, l3, l4 = rotation + d.crank_phase, d.crank_length, d.coupler_length, d.rocker_length
+            square = kind.square(d.ground_length - l2 * casadi.cos(th2), l2 * casadi.sin(th2))
+            both = kind.transmission_excess(l3, l4, square, square, cosine)
+            return casadi.horzcat(*both) / kind.excess_slope(l3, l4, cosine)
+
+        return (RotationRequirement.between(self.between, function=excess, name="range without a toggle"),)

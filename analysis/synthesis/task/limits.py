@@ -1,10 +1,10 @@
-"""Convert bounds and constraints to normal form, for each kind of linkage that can do a task."""
+"""Define unknown motions of the rocker pivot; convert bounds and constraints to normal form, for each kind of linkage."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import inf, isfinite, pi
 from typing import Any, get_args
 
 import numpy as np
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ...files import unknown_name
-from ..linkage.linkage import ANGLES, LINKS, FiveBar, Linkage, SliderCrank
-from ..linkage.pivot import CrankUnknown, Kind, gear_turns
+from ...units import Amount, in_si
+from ..linkage.linkage import ANGLES, LINKS, FiveBar, Kind, Linkage, SliderCrank, gear_turns
 from .constraint import (
     SECOND_LENGTH,
     UNKNOWNS,
@@ -32,9 +32,6 @@ from .constraint import (
     RotationRange,
     RotationRequirement,
     Stroke,
-    TimeRatio,
-    _constraint_names,
-    _slider_time_ratio,
 )
 from .task import Normal, RockerFunction, SliderFunction, Task
 
@@ -45,6 +42,83 @@ LARGEST = 5.0
 GROUND = 0.1
 #: Grashof types whose crank does not turn fully.
 _SWINGING = ("double-rocker", "rocker-crank", "triple-rocker")
+
+
+@in_si(guide_angle="rad", position="m", stroke="m", speed="m", acceleration="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderUnknown:
+    """A slider whose motion is unknown: a Fourier series with a given number of harmonics.
+
+    Attributes
+    ----------
+    harmonics : int
+        Number of harmonics; 0 for a slider that is adjusted once and does not move.
+    guide_angle : (float, float)
+        Bounds of the guide's direction from the ground link (rad); equal bounds fix it.
+    position : (float, float), optional
+        Least and greatest slider position (m); by default minus and plus the ground link's length.
+    stroke : float
+        Greatest length of the slider's travel (m).
+    speed, acceleration : float
+        Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
+    """
+
+    harmonics: int
+    guide_angle: tuple[Amount, Amount] = (-pi, pi)
+    position: tuple[Amount, Amount] | None = None
+    stroke: Amount = inf
+    speed: Amount = inf
+    acceleration: Amount = inf
+
+    def __post_init__(self) -> None:
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        low, high = self.guide_angle
+        if not (isfinite(low) and isfinite(high) and low <= high):
+            raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
+        if self.position is not None:
+            low, high = self.position
+            if not (isfinite(low) and isfinite(high) and low < high):
+                raise ParameterError(
+                    "bounds of slider position", self.position, "be two finite lengths, increasing (m)"
+                )
+        for name in ("stroke", "speed", "acceleration"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
+
+
+@in_si(length="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrankUnknown:
+    """A second crank whose length, phase and, with ``harmonics``, independent rotation are unknown.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the second crank per turn of the first: see `SecondCrank`.
+    length : (float, float)
+        Bounds of the second crank's length (m).
+    harmonics : int
+        Number of harmonics of the rotation that is added to the rotation by the gears; 0 for gears alone.
+    speed : float
+        Greatest magnitude of the derivative of the added rotation with respect to phi.
+    """
+
+    ratio: float
+    length: tuple[Amount, Amount]
+    harmonics: int = 0
+    speed: float = inf
+
+    def __post_init__(self) -> None:
+        low, high = self.length
+        if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
+            raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
+        gear_turns(self.ratio)
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+
+
+PivotUnknown = SliderUnknown | CrankUnknown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,15 +226,14 @@ def make_limits(
             raise unknown_name(name, sorted(UNKNOWNS), f"dimension {name!r}, which is to have bounds")
     for c in constraints:
         if not isinstance(c, Constraint):
-            raise InputError(f"{c!r} is not a constraint: use {', '.join(_constraint_names())}")
+            raise InputError(f"{c!r} is not a constraint: use one of analysis.synthesis, such as LeastTransmission")
     given = _dimension_ranges(task, normal, bounds, constraints, linkage)
-    _check_links(given, constraints, linkage)
     _check_reach(given, normal, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
     shift[:2] = normal.origin.real, normal.origin.imag
     scale[:7] = normal.unit
-    turn, way, grashof = _transmission_limits(constraints, normal.whole_turn)
+    turn, way, grashof = _transmission_limits(constraints, normal.whole_turn, linkage)
     if way is not None and normal.whole_turn and grashof not in _SWINGING:
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
@@ -244,7 +317,7 @@ def _required_functions(constraint: Constraint, way: RotationRange) -> tuple[Req
 
 
 def _transmission_limits(
-    constraints: Sequence[Constraint], whole_turn: bool
+    constraints: Sequence[Constraint], whole_turn: bool, linkage: type[Linkage]
 ) -> tuple[float | None, float | None, str | None]:
     """Return the least transmission angles over a turn and during the task, and the Grashof type; see `Limits`.
 
@@ -256,11 +329,12 @@ def _transmission_limits(
     )
     types: set[str] = {c.type for c in constraints if isinstance(c, Grashof)}
     demands = [c for c in constraints if isinstance(c, Demand)]
-    types |= {c.grashof for c in demands if c.grashof is not None}
+    types |= {c.grashof for c in demands if c.grashof is not None and linkage is not SliderCrank}
     if len(types) > 1:
         raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
     type_ = types.pop() if types else None
-    if turn is None and (any(isinstance(c, FullTurn) for c in constraints) or type_ in ("crank-rocker", "drag-link")):
+    turning = any(isinstance(c, FullTurn) or (isinstance(c, Demand) and c.turns) for c in constraints)
+    if turn is None and (turning or type_ in ("crank-rocker", "drag-link")):
         turn = 0.0
     if type_ in _SWINGING:
         if turn is not None:
@@ -310,23 +384,6 @@ def complete_bounds(
     return low, high
 
 
-def _check_links(
-    given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], linkage: type[Linkage]
-) -> None:
-    """Check that the bounds of the links allow a crank that turns fully, if the constraints require a full turn."""
-    if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
-        return
-    l1, l2, l3, l4 = (given[name] for name in LINKS)
-    # l1 + l2 <= l3 + l4 is needed for a full turn, of a slider-crank l1 + l2 <= l3
-    sliding = linkage is SliderCrank
-    least, most = l1[0] + l2[0], l3[1] + (0.0 if sliding else l4[1])
-    if least > most:
-        raise InfeasibleError(
-            f"the crank cannot turn fully: {'offset' if sliding else 'ground link'} and crank are at least "
-            f"{1e3 * least:.4g} mm together, {'the coupler' if sliding else 'coupler and rocker'} at most {1e3 * most:.4g} mm"
-        )
-
-
 def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, constraints: Sequence[Constraint]) -> None:
     """Check that the coupler point can span the target: its distance from A is at most crank plus point distance."""
     from shapely import MultiPoint, Polygon, box
@@ -366,8 +423,8 @@ GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
 #: Constraints that apply to any linkage, and all that apply to each kind.
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
 _SUPPORTED: Mapping[Kind, tuple[type, ...]] = {
-    "four-bar": get_args(Constraint),
-    "slider-crank": (*_ANY, Demand, Stroke),
+    "four-bar": (*_ANY, Demand, Grashof),
+    "slider-crank": (*_ANY, Demand),
     "geared-five-bar": _ANY,
 }
 #: Reason why a `Demand` does not apply to a five-bar.
@@ -383,7 +440,7 @@ def limits_by_kind(
     task: Task,
     normal: Normal,
     bounds: Mapping[str, tuple[float, float]] | None,
-    constraints: Sequence[Constraint | Stroke],
+    constraints: Sequence[Constraint],
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
 ) -> list[Limits]:
@@ -407,8 +464,7 @@ def limits_by_kind(
         check_task(kind, task)
         _check_constraints(kind, constraints)
         if kind == "four-bar":
-            own: Sequence[Any] = constraints
-            found.append(make_limits(task, normal, bounds, own))
+            found.append(make_limits(task, normal, bounds, constraints))
         elif kind == "slider-crank":
             found.append(_slider_crank_limits(task, normal, bounds, constraints))
         else:
@@ -430,29 +486,23 @@ def check_task(kind: Kind, task: Task) -> None:
 
 def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:
     for c in constraints:
-        known = isinstance(c, Constraint | Stroke)
-        if (known and not isinstance(c, _SUPPORTED[kind])) or (
-            kind == "slider-crank" and getattr(c, "pivot", None) == "D"
-        ):
+        if isinstance(c, Constraint) and not _supports(kind, c):
             name = "a region of pivot D" if isinstance(c, PivotRegion) else type(c).__name__
-            able = [other for other, kept in _SUPPORTED.items() if isinstance(c, kept) and other != kind]
+            able = [other for other in _SUPPORTED if _supports(other, c)]
             why = "" if kind == "slider-crank" or not isinstance(c, Demand) else f" ({_NO_DEMANDS})"
             raise InputError(f"a {kind} cannot keep {name}{why}: leave it out, or ask for {' or '.join(able)} alone")
 
 
+def _supports(kind: Kind, c: Constraint) -> bool:
+    if isinstance(c, Stroke) or (isinstance(c, PivotRegion) and c.pivot == "D"):
+        return (kind == "slider-crank") == isinstance(c, Stroke)
+    return isinstance(c, _SUPPORTED[kind])
+
+
 def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
-    own: list[Constraint] = []
-    for c in constraints:
-        if isinstance(c, Stroke):
-            own += c.requires()
-        elif isinstance(c, TimeRatio):
-            own += _slider_time_ratio(c)
-        else:
-            own.append(c)
-    if any(isinstance(c, Stroke | TimeRatio) for c in constraints):
-        own.append(FullTurn())
     if isinstance(task, SliderFunction):
-        own += (
+        constraints = (
+            *constraints,
             # the guide is the x axis, with the shaft on either side, and the coupler point is the slider
             Require(function=lambda d: np.cos(d.ground_angle), equal=True, name="direction of the guide"),
             Require(
@@ -473,7 +523,7 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds)
     given = {n: ends for n, ends in bounds.items() if n != "rocker_length"}
     least, most = complete_bounds("ground_length", bounds.get("ground_length", (None, None)), (0.0, inf))
-    limits = make_limits(task, normal, given | {"ground_length": (least, most)}, own, linkage=SliderCrank)
+    limits = make_limits(task, normal, given | {"ground_length": (least, most)}, constraints, linkage=SliderCrank)
     if least < 0.0:
         raise ParameterError(
             "bound of ground_length",

@@ -1,4 +1,4 @@
-"""Represent target curves as points in m, and measure the deviation of a traced curve from its target.
+"""Represent targets, from points, files or formulas, and measure the deviation of a traced curve from its target.
 
 A curve is a polyline: straight segments join its points; in a closed curve a segment also joins the last point to the first.
 Length, centroid, size and areas are exact for the polyline.
@@ -6,16 +6,21 @@ Length, centroid, size and areas are exact for the polyline.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import atan2, cos, isfinite, pi, sin
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import cos, e, pi, sin, tau
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ...files import read_points
+from ...files import read_points, unknown_name
+from ...units import quantity
 
 FloatArray = NDArray[np.float64]
 #: Fraction of a curve's extent below which two points coincide, and of its length squared below which its area is zero.
@@ -36,16 +41,14 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     try:
         array = np.array(points, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{what} is not an array of numbers: {error}") from error
+        raise InputError(f"{what}: not an array of numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 2:
-        raise InputError(f"{what} has shape {array.shape}: it must be (n, 2), one point per row")
+        raise InputError(f"{what}: the shape is {array.shape}, it must be (n, 2), one point per row")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
-        raise InputError(
-            f"{what} has {len(bad)} points that are not finite, the first at index {bad[0]}: {array[bad[0]]}"
-        )
+        raise InputError(f"{what}: {len(bad)} are not finite, the first at index {bad[0]}: {array[bad[0]]}")
     if len(array) < least:
-        raise InputError(f"{what} has {len(array)} points: it needs at least {least}")
+        raise InputError(f"{what}: {len(array)} are too few, there must be at least {least}")
     return array
 
 
@@ -126,7 +129,7 @@ class TargetPath:
     closed: bool
 
     def __post_init__(self) -> None:
-        points = plane_points(self.points, "the target", 3 if self.closed else 2)
+        points = plane_points(self.points, "points of the target", 3 if self.closed else 2)
         extent = float(np.ptp(points, axis=0).max())
         nothing = COINCIDENT * max(extent, float(np.abs(points).max()))
         if extent <= nothing:
@@ -156,10 +159,7 @@ class TargetPath:
     ) -> TargetPath:
         """Read the curve of a CSV or SVG file; see `analysis.files.read_points`. If given, ``closed`` overrules the file.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be read, or its points are not a valid target.
+        Raises InputError if the file cannot be read, or its points are not a valid target.
         """
         points, found = read_points(path, unit=unit, name=name)
         return cls(points=points, closed=found if closed is None else closed)
@@ -169,115 +169,38 @@ class TargetPath:
         """Return the length of the polyline (m)."""
         return float(arc_lengths(closed_vertices(self.points, self.closed))[-1])
 
-    def _segments(self) -> tuple[FloatArray, FloatArray]:
-        vertices = closed_vertices(self.points, self.closed)
-        return 0.5 * (vertices[:-1] + vertices[1:]), np.hypot(*np.diff(vertices, axis=0).T)
-
-    @property
-    def centroid(self) -> FloatArray:
-        """Return the centroid of the line itself, not of the area inside (m), shape (2,)."""
-        middles, lengths = self._segments()
-        return lengths @ middles / lengths.sum()
-
     @property
     def size(self) -> float:
         """Return the radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
-        middles, lengths = self._segments()
+        vertices = closed_vertices(self.points, self.closed)
+        middles, lengths = 0.5 * (vertices[:-1] + vertices[1:]), np.hypot(*np.diff(vertices, axis=0).T)
+        centroid = lengths @ middles / lengths.sum()
         # the mean squared distance of a segment from its own middle is l^2/12
-        squares = ((middles - self.centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
+        squares = ((middles - centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
         return float(np.sqrt(lengths @ squares / lengths.sum()))
-
-    @property
-    def signed_area(self) -> float:
-        """Return the integral of x dy around the closed curve (m2): positive counter-clockwise; lobes of a figure-eight cancel.
-
-        Raises
-        ------
-        InputError
-            If the curve is open.
-        """
-        self._must_be_closed()
-        x, y = (self.points - self.points[0]).T
-        return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
     @property
     def enclosed_area(self) -> float:
         """Return the enclosed area, by the even-odd rule (m2); see `even_odd_area`.
 
-        Raises
-        ------
-        InputError
-            If the curve is open.
+        Raises InputError if the curve is open.
         """
-        self._must_be_closed()
-        return even_odd_area(self.points)
-
-    def _must_be_closed(self) -> None:
         if not self.closed:
             raise InputError("the target is open: it encloses no area")
-
-    @property
-    def weights(self) -> FloatArray:
-        """Return the arc length that belongs to each point: half the length of its two segments (m), shape (n,)."""
-        return half_lengths(self._segments()[1], self.closed)
-
-    @property
-    def normals(self) -> FloatArray:
-        """Return the unit normals at the points, shape (n, 2): outward for a closed curve, to the right along an open one.
-
-        A normal is perpendicular to the parabola through the point and its two neighbours (second order in the spacing), or at
-        an open end to the end segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
-        """
-        vertices = closed_vertices(self.points, self.closed)
-        steps = np.diff(vertices, axis=0)
-        lengths = np.hypot(*steps.T)[:, None]
-        units = steps / lengths
-        if self.closed:
-            before, after, h, k = np.roll(units, 1, axis=0), units, np.roll(lengths, 1, axis=0), lengths
-        else:
-            before, after = np.vstack([units[:1], units]), np.vstack([units, units[-1:]])
-            h, k = np.vstack([lengths[:1], lengths]), np.vstack([lengths, lengths[-1:]])
-        tangents = (k * before + h * after) / (h + k)
-        size = np.hypot(*tangents.T)[:, None]
-        # at the tip of a cusp, where the curve turns back on itself, take the tangent before the tip
-        tangents = np.where(size > 1e-9, tangents / np.maximum(size, 1e-9), before)
-        side = -1.0 if self.closed and self.signed_area < 0.0 else 1.0
-        return side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
-
-    def reverse(self) -> TargetPath:
-        """Return the same curve in the opposite direction; a closed curve starts at the same point."""
-        points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
-        return TargetPath(points=points, closed=self.closed)
+        return even_odd_area(self.points)
 
     def resample(self, n: int) -> TargetPath:
         """Return the curve through n points of the polyline at equal arc lengths, from the first point.
 
         An open curve keeps both ends.
 
-        Raises
-        ------
-        InputError
-            If n is less than 3 (2 if open), or points coincide.
+        Raises InputError if n is less than 3 (2 if open), or points coincide.
         """
         least = 3 if self.closed else 2
         if n < least:
             raise InputError(f"{n} points are asked for: there must be at least {least}")
         s = np.linspace(0.0, self.length, n, endpoint=not self.closed)
         return TargetPath(points=interpolate_polyline(closed_vertices(self.points, self.closed), s), closed=self.closed)
-
-    def transform(
-        self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
-    ) -> TargetPath:
-        """Return the curve scaled and rotated (rad, counter-clockwise) about the origin, then shifted (m).
-
-        Raises
-        ------
-        InputError
-            If the scale is not greater than zero, or a number is not finite.
-        """
-        if not scale > 0.0:
-            raise InputError(f"the scale is {scale!r}: it must be greater than zero")
-        return TargetPath(points=transform_points(self.points, scale, angle, shift), closed=self.closed)
 
     def smooth(self, n: int, *, deviation: float | None = None) -> TargetPath:
         """Fit a cubic smoothing spline to a noisy curve; return n points of the spline at equal arc lengths as a curve.
@@ -396,7 +319,7 @@ def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) 
     """
     import shapely
 
-    line = shapely.LineString(closed_vertices(plane_points(curve, "the curve", 2), closed))
+    line = shapely.LineString(closed_vertices(plane_points(curve, "points of the curve", 2), closed))
     return shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
 
 
@@ -437,7 +360,7 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
     InputError
         If the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
     """
-    points = plane_points(curve, "the curve", 3 if closed else 2)
+    points = plane_points(curve, "points of the curve", 3 if closed else 2)
     if closed and target.closed:
         return even_odd_area(target.points, points)
     middles, length = _cut_into_pieces(closed_vertices(target.points, target.closed))
@@ -465,7 +388,7 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
     InputError
         As for `area_difference`.
     """
-    points = plane_points(curve, "the curve", 3 if closed else 2)
+    points = plane_points(curve, "points of the curve", 3 if closed else 2)
     seen = np.vstack([target.points, _cut_into_pieces(closed_vertices(target.points, target.closed))[0]])
     largest = float(curve_distance(points, seen, closed=closed).max())
     if closed and not target.closed:
@@ -474,95 +397,248 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
     return max(largest, float(curve_distance(target.points, seen, closed=target.closed).max()))
 
 
-# Straight parts
+def straightness(part: ArrayLike, direction: float) -> tuple[float, float]:
+    """Return travel and flatness of a part of a curve, whose points have the shape (n, 2): two lengths (m).
+
+    The travel is the distance from the first point to the last along the ``direction`` (rad) of a straight line; the flatness
+    is the distance between the outermost points across this line.
+    """
+    points = plane_points(part, "points of the part", 2)
+    points = points - points[0]
+    along, across = (points @ np.array([[cos(direction), -sin(direction)], [sin(direction), cos(direction)]])).T
+    return abs(float(along[-1])), float(np.ptp(across))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Straightness:
-    """Length and flatness of a part of a curve, along and across a straight line.
+# Formulas
 
-    Attributes
-    ----------
-    travel : float
-        Distance from the part's first to its last point, along the line (m).
-    extent : float
-        Distance between the outermost points along the line (m): more than the travel if the part turns back.
-    flatness : float
-        Distance between the outermost points across the line (m).
-    direction : float
-        Direction of the line, from the first point to the last (rad, -pi to pi).
-    start : int
-        Index of the part's first point in the curve.
+Spacing = Literal["even", "chebyshev"]
+#: Constants, functions and operators of formulas; most functions have one argument.
+_CONSTANTS = {"pi": pi, "e": e, "tau": tau}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
+    **{name: getattr(np, name) for name in ("abs", "sign", "floor", "ceil", "degrees", "radians", "hypot")},
+    **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
+    "min": np.minimum,
+    "max": np.maximum,
+}
+_TWO_ARGUMENTS = ("atan2", "hypot", "min", "max")
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
+#: Longest expression, in characters.
+_LONGEST = 1000
+
+
+def parse_expression(text: str, what: str) -> ast.expr:
+    """Parse a text with `ast`, without running it; ``what`` is its name in messages, as in "the formula".
+
+    Raises InputError if the text is too long, or not an expression.
+    """
+    if len(text) > _LONGEST:
+        raise InputError(f"{what} {text[:40]!r}... has {len(text)} characters: it must have no more than {_LONGEST}")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        reason = error.msg if isinstance(error, SyntaxError) else str(error)
+        raise InputError(f"{what} {text!r} cannot be read: {reason}") from None
+
+
+def evaluate_expression(
+    node: ast.expr, what: str, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
+) -> Any:
+    """Evaluate a parsed expression of numbers, ``names``, ``functions`` and operators, and refuse anything else.
+
+    Raises InputError, which begins with ``what``, such as "the formula 't^2'", and names the wrong part.
     """
 
-    travel: float
-    extent: float
-    flatness: float
-    direction: float
-    start: int = 0
+    def refusal(node: ast.AST, reason: str) -> InputError:
+        return InputError(f"in {what}: {ast.unparse(node)!r} {reason}")
+
+    def value(node: ast.AST) -> Any:
+        match node:
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                try:
+                    return np.float64(number)
+                except OverflowError:
+                    raise refusal(node, "is too large") from None
+            case ast.Name(id=name):
+                if name not in names:
+                    raise refusal(node, f"is not known: {unknown_name(name, [*names])}")
+                return names[name]
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](value(left), value(right))
+            case ast.BinOp(op=ast.BitXor()):
+                raise refusal(node, "has ^, which is no power here: write **")
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](value(operand))
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+                if name not in functions:
+                    raise refusal(node, f"is not known: {unknown_name(name, [*functions])}")
+                count = 2 if name in _TWO_ARGUMENTS else 1
+                if len(args) != count:
+                    raise refusal(node, f"has {len(args)} arguments: {name} takes {count}")
+                return functions[name](*map(value, args))
+            case _:
+                raise refusal(node, "is not allowed: there may be numbers, operators, functions and names only")
+
+    try:
+        with np.errstate(all="ignore"):
+            return value(node)
+    except RecursionError:
+        raise InputError(f"{what} is nested too deeply") from None
 
 
-def straightness(part: ArrayLike, *, direction: float | None = None) -> Straightness:
-    """Compute travel and flatness of a part of a curve.
+def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
+    """Convert a text such as ``"70 + 100*abs(sin(t/2))"`` to a function of one variable.
 
-    Parameters
-    ----------
-    part : array_like, shape (n, 2)
-        Points of the part in order (m), for example those within a range of crank angles.
-    direction : float, optional
-        Direction of the wanted line (rad). The default is the direction of the narrowest strip that contains the points (the
-        minimum zone of ISO 1101; an edge of the convex hull lies along the strip).
+    The text may contain numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh
+    exp log sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians.
+
+    Returns
+    -------
+    callable
+        Function of an array, with a result of the same shape; it raises InputError if a value is not finite.
 
     Raises
     ------
     InputError
-        If there are fewer than 2 points, a number is not finite, or no direction is given and all points are the same.
+        If the text is not a formula of this kind; the message names the wrong part.
     """
-    points = plane_points(part, "the part", 2)
-    points = points - points[0]
-    if direction is None:
-        direction = _narrowest_direction(points)
-    elif not isfinite(direction):
-        raise InputError(f"the direction is {direction!r}: it must be finite")
-    distance, across = (points @ np.array([[cos(direction), -sin(direction)], [sin(direction), cos(direction)]])).T
-    if distance[-1] < 0.0:
-        direction += pi
-    return Straightness(
-        travel=abs(float(distance[-1])),
-        extent=float(np.ptp(distance)),
-        flatness=float(np.ptp(across)),
-        direction=atan2(sin(direction), cos(direction)),
-    )
+    if not isinstance(text, str):
+        raise InputError(f"a formula must be a text, not {text!r}")
+    tree, what = parse_expression(text, "the formula"), f"the formula {text!r}"
+
+    def value(t: FloatArray) -> Any:
+        return evaluate_expression(tree, what, {variable: t} | _CONSTANTS, _FUNCTIONS)
+
+    def evaluate_formula(t: ArrayLike) -> FloatArray:
+        t = np.asarray(t, dtype=float)
+        values: FloatArray = np.array(np.broadcast_to(value(t), t.shape), dtype=float)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{what} has the value {values.flat[bad[0]]} at {variable} = {t.flat[bad[0]]:.6g}: it must be finite"
+            )
+        return values
+
+    value(np.zeros(()))
+    return evaluate_formula
 
 
-def _narrowest_direction(points: FloatArray) -> float:
-    """Return the direction of the narrowest strip that contains the points."""
-    import shapely
-
-    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(points)))
-    if len(hull) == 1:
-        raise InputError(f"all {len(points)} points of the part are the same one: it has no direction")
-    edges = np.diff(hull, axis=0)
-    edges /= np.hypot(*edges.T)[:, None]
-    widths = np.ptp(edges[:, :1] * hull[:, 1] - edges[:, 1:] * hull[:, 0], axis=1)
-    x, y = edges[int(np.argmin(widths))]
-    return atan2(y, x)
+def _number(value: float | str) -> float:
+    return float(formula(value, "")(0.0)) if isinstance(value, str) else float(value)
 
 
-def straight_parts(
-    curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
-) -> list[Straightness]:
-    """Return travel and flatness of every part of a curve that consists of ``count`` successive points.
+def _parameter(start: float | str, end: float | str, n: int, turn: bool) -> FloatArray:
+    """Return n evenly spaced values from start to end; ``turn`` leaves the end out."""
+    a, b = _number(start), _number(end)
+    if not (np.isfinite([a, b]).all() and b > a):
+        raise InputError(f"the parameter goes from {start!r} to {end!r}: the end must be greater, and both finite")
+    return np.linspace(a, b, n, endpoint=not turn)
 
-    ``curve`` has the shape (n, 2), in m; for ``direction`` see `straightness`. In a ``closed`` curve a part may continue from
-    the last point to the first. Raises InputError if the curve has fewer than ``count`` points.
+
+def path_from_formula(
+    x: str,
+    y: str,
+    *,
+    n: int = 72,
+    unit: str = "m",
+    start: float | str = 0.0,
+    end: float | str = 2.0 * pi,
+) -> TargetPath:
+    """Compute a curve from two formulas, at n equal steps of their parameter.
+
+    Parameters
+    ----------
+    x, y : str
+        See `formula`; for example ``"20 + 10*cos(t)"`` and ``"15 + 5*sin(t)"``.
+    n : int
+        Number of points.
+    unit : str
+        Unit of the formulas' values, such as ``"cm"``.
+    start, end : float or str
+        Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve ends at its first point (to within
+        1e-9 of its extent), it is closed, and that point is not repeated.
+
+    Raises
+    ------
+    InputError
+        If a formula, the range or the curve is not usable.
+    ParameterError
+        If the unit is not a unit of length.
     """
-    points = plane_points(curve, "the curve", 2)
-    if not 2 <= count <= len(points):
-        raise InputError(f"a part of {count} points of {len(points)}: it must have from 2 to {len(points)} points")
-    starts = len(points) if closed else len(points) - count + 1
-    # a part may cross the seam of a closed curve: append the curve's beginning
-    laid = np.vstack([points, points[: count - 1]]) if closed else points
-    return [
-        replace(straightness(laid[start : start + count], direction=direction), start=start) for start in range(starts)
-    ]
+    factor = quantity(f"1 {unit}", "m", "unit")
+    functions = [formula(text) for text in (x, y)]
+
+    def points(turn: bool, number: int) -> FloatArray:
+        t = _parameter(start, end, number, turn)
+        return factor * np.column_stack([f(t) for f in functions])
+
+    drawn = points(False, n + 1)
+    closed = bool(np.hypot(*(drawn[-1] - drawn[0])) <= 1e-9 * np.ptp(drawn, axis=0).max())
+    return TargetPath(points=points(closed, n), closed=closed)
+
+
+def function_from_formula(
+    text: str,
+    *,
+    n: int = 72,
+    unit: str = "rad",
+    start: float | str = 0.0,
+    end: float | str = 2.0 * pi,
+    spacing: Spacing = "even",
+) -> tuple[FloatArray, FloatArray]:
+    """Compute angles at n equal steps of the crank angle from a formula such as ``"70 + 100*abs(sin(t/2))"``.
+
+    Parameters
+    ----------
+    text : str
+        See `formula`; its variable is the crank angle omega t (rad).
+    n
+        As for `path_from_formula`.
+    unit : str
+        Unit of the formula's value.
+    start, end : float or str
+        Range of the crank angle. If it is a number of whole turns, the end is left out, because it repeats the start.
+    spacing : "even" or "chebyshev"
+        "chebyshev" is for precision points: see `chebyshev_spacing`.
+
+    Returns
+    -------
+    crank_angle, angle : ndarray, shape (n,)
+        Crank angles and angles of the formula (rad).
+
+    Raises
+    ------
+    InputError
+        If the formula or the range is not usable.
+    ParameterError
+        If the unit is not a unit of angle.
+    """
+    factor = quantity(f"1 {unit}", "rad", "unit")
+    if spacing == "chebyshev":
+        places = chebyshev_spacing(_number(start), _number(end), n)
+        return places, factor * formula(text)(places)
+    turns = (_number(end) - _number(start)) / tau
+    whole = bool(np.isfinite(turns) and abs(turns - round(turns)) < 1e-9)
+    crank_angle = _parameter(start, end, n, whole)
+    return crank_angle, factor * formula(text)(crank_angle)
+
+
+def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
+    """Return n precision points between two limits, spaced so that the error between them is nearly the least possible.
+
+    The points are the roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
+
+    Raises InputError if there is no point, or the limits are not in order.
+    """
+    if n < 1 or not (np.isfinite([low, high]).all() and low < high):
+        raise InputError(f"{n} precision points from {low:g} to {high:g}: at least one, between finite limits in order")
+    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos((2.0 * np.arange(1, n + 1) - 1.0) * pi / (2 * n))

@@ -10,7 +10,7 @@ the sum of squared distances to the curve.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import hypot, isfinite, pi
 from typing import Any, Literal, get_args
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ...units import in_si
-from .target import TargetPath, half_lengths
+from .target import TargetPath, half_lengths, plane_points
 
 FloatArray = NDArray[np.float64]
 #: Default size of a target at which a body only rotates (m).
@@ -29,16 +29,6 @@ TURNED = 0.1
 Measure = Literal["area", "distance"]
 Objective = Literal["error", "worst"]
 Quality = Literal["squares", "area", "worst"]
-
-
-def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
-    points = np.array(values, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise InputError(f"{what} have the shape {points.shape}: they must be n points of two coordinates, (n, 2)")
-    _check_finite(points, what)
-    if len(points) < least:
-        raise InputError(f"{what}: {len(points)} are too few, there must be at least {least}")
-    return points
 
 
 def _check_different(
@@ -143,7 +133,7 @@ class TimedPath:
     def __post_init__(self) -> None:
         _check_objective(self.objective)
         # any number of linkages pass two points exactly
-        points = _points(self.points, "target points", 3)
+        points = plane_points(self.points, "target points", 3)
         _check_extent(points, "target points")
         n = len(points)
         _set_fields(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
@@ -322,7 +312,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         _check_objective(self.objective)
-        points = _points(self.points, "target points", 2)
+        points = plane_points(self.points, "target points", 2)
         n = len(points)
         angle = _numbers(self.angle, "target angles", n)
         _check_different(points, "target poses", self.rotation, angle)
@@ -361,7 +351,7 @@ class PrecisionPoints:
 
     def __post_init__(self) -> None:
         _check_objective(self.objective)
-        points = _points(self.points, "precision points", 2)
+        points = plane_points(self.points, "precision points", 2)
         angle = None if self.angle is None else _numbers(self.angle, "target angles", len(points))
         _check_different(points, "precision points", self.rotation, angle)
         _set_fields(self, points=points)
@@ -489,27 +479,10 @@ class Normal:
         return length[: self.n] / length[-1]
 
 
-def replace_weights(task: Task, weights: ArrayLike | None) -> Task:
-    """Return the task with these weights; None leaves the task unchanged.
-
-    Raises InputError if there is not one weight per target, or if the task does not take weights.
-    """
-    if weights is None:
-        return task
-    if isinstance(task, PrecisionPoints):
-        raise InputError("precision points are met exactly: they have no weights")
-    if not next(f.init for f in fields(task) if f.name == "weights"):
-        raise InputError(f"a {type(task).__name__} is met exactly: it has no weights")
-    return replace(task, weights=weights)
-
-
 def normal_form(task: Task) -> Normal:
     """Return the normal form of a task.
 
-    Raises
-    ------
-    InputError
-        If the argument is not a task.
+    Raises InputError if the argument is not a task.
     """
     if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
         raise InputError(

@@ -1,12 +1,13 @@
-"""Draw a solution: the linkage in several positions with curve and target, and its links as plates."""
+"""Write solutions for CAD and simulation: drawings, plates, and tables of case files."""
 
 from __future__ import annotations
 
+from cmath import rect
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from math import dist, hypot, isfinite, pi, tau
+from math import cos, dist, hypot, isfinite, pi, remainder, sin, tau
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,13 @@ from numpy.typing import NDArray
 from shapely import LineString
 
 from linkwork.errors import AssemblyError, ParameterError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from ...files import Circle, Dimension, Drawing, Layer, Line, Polyline, Text
-from ..linkage.linkage import FiveBar, Linkage, SliderCrank
-from ..linkage.pivot import format_ratio
+from ...run import Inputs, parameter_tables, simulate
+from ...units import with_unit
+from ..linkage.linkage import FiveBar, Linkage, SecondCrank, SliderCrank, SliderMotion, format_ratio
+from ..linkage.machine import MachineSpec, is_on_line, link_mass_properties
 from ..task.task import UntimedPath
 from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
@@ -180,6 +184,8 @@ class LinkageScene:
         return None if slider is None else ("slider position [m]", slider[0])
 
 
+#: Greatest number of runs until a slider has settled.
+SETTLING = 5
 Point = tuple[float, float]
 #: Radius of a pin and height of a letter, relative to the drawing's extent.
 PIN, LETTER = 0.008, 0.022
@@ -465,3 +471,225 @@ def _guide_and_block(
     block = np.array([d + radius * (3.0 * s * along + 2.0 * n * left) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     start, end = ((float(x), float(y)) for x, y in ends)
     return Line(layer="guide", start=start, end=end), Polyline(layer="slider", points=block, closed=True)
+
+
+# Tables of a case file, from which the linkage can be simulated, exported as an FMU and shown in the studio
+
+
+def run_case(solution: Solution, make: MachineSpec, title: str) -> dict[str, Any]:
+    """Return the tables of a case file that runs the linkage through its task at constant speed.
+
+    A slider-crank runs as the slider-crank mechanism, any other linkage as the five-bar slider; see `docs/case-files.md`.
+    The five-bar's slider starts in its steady motion or, if the crank does not turn fully, in equilibrium.
+    """
+    linkage, at = solution.linkage, solution.evaluation.rotation
+    start = (0.0 if at is None else float(at[0])) + linkage.crank_phase
+    run: dict[str, Any] = {"revolutions": 2.0}
+    if not solution.verdicts.full_turn and at is not None:
+        # a crank that cannot turn fully: from the first target to the last
+        run = {"stop_time": with_unit(float(np.ptp(at)) / make.speed, "s")}
+    across, along = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
+    load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
+    if isinstance(linkage, SliderCrank):
+        # at the slider alone, which the plant loads along its guide
+        load = with_unit(along if linkage.point_is_pin else 0.0, "N")
+    speed, plant, angle = solution.direction * make.speed, make.plant(linkage), remainder(start, tau)
+    initial = {"crank_angle": with_unit(angle, "rad")}
+    if isinstance(plant, FiveBarParameters):
+        turning = Inputs(speed=speed if "revolutions" in run else 0.0, load_x=across, load_y=along)
+        position, velocity = settle_slider(plant, turning, angle, tau / make.speed)
+        initial |= {"slider_position": with_unit(position, "m"), "slider_velocity": with_unit(velocity, "m/s")}
+    return {
+        "title": title,
+        **parameter_tables(plant),
+        "initial": initial,
+        "drive": {"speed": with_unit(speed, "rad/s")},
+        **({"load": load} if any(make.load) else {}),
+        "run": run,
+    }
+
+
+def settle_slider(
+    parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
+) -> tuple[float, float]:
+    """Return position (m) and velocity (m/s) of a slider that a run of ``duration`` (s) returns to; zeros if it has none.
+
+    With a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
+    is repeated at most `SETTLING` times until the slider is within a millionth of its travel. SciPy's method is used: to
+    compile the solver would take longer.
+    """
+    slider = 0.0, 0.0
+    for _ in range(SETTLING):
+        start = InitialState(crank_angle=crank_angle, slider_position=slider[0], slider_velocity=slider[1])
+        run = simulate(parameters, acting, initial=start, stop_time=duration, step=duration / 64.0, method="LSODA")
+        if run.status:
+            break
+        before, slider = slider, (float(run["slider.position"][-1]), float(run["slider.velocity"][-1]))
+        swept = max(np.abs(run["slider.position"]).max(), np.abs(run["slider.velocity"]).max() * duration / (2.0 * pi))
+        if max(abs(slider[0] - before[0]), abs(slider[1] - before[1]) * duration / (2.0 * pi)) <= 1e-6 * swept:
+            return slider
+    return 0.0, 0.0
+
+
+def described_case(solution: Solution, make: MachineSpec, title: str) -> dict[str, Any]:
+    """Return the tables of a case file that describes the linkage and simulates it; see `docs/linkages.md`."""
+    linkage, at = solution.linkage, solution.evaluation.rotation
+    start = 0.0 if at is None else float(at[0])
+    tables = description(linkage, make, rotation=start, direction=solution.direction)
+    moved = drives(linkage, make, rotation=start, direction=solution.direction)
+    run: dict[str, Any] = {"revolutions": 2.0 * linkage.turns}
+    if not solution.verdicts.full_turn and at is not None:
+        run = {"stop_time": with_unit(float(np.ptp(at)) * linkage.turns / make.speed, "s")}
+    elif moved:
+        turn = tau / make.speed
+        run = {"stop_time": with_unit(2.0 * linkage.turns * turn, "s"), "step": with_unit(turn / 360.0, "s")}
+    return {"title": title, "linkage": tables, **moved, **loads(linkage, make), "run": run}
+
+
+def description(
+    linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0
+) -> dict[str, Any]:
+    """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
+
+    A rocker pivot that moves on a guide, or on a crank without gears, is a second degree of freedom. For such a linkage
+    `drives` returns the speeds of crank and pivot.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    make : MachineSpec
+        Bars, gravity and the speed of the crank.
+    rotation : float
+        Rotation of the input shaft at the start (rad).
+    direction : float
+        Sense in which the crank turns: +1 counter-clockwise, -1 clockwise.
+    """
+    a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
+    end = shaft + rect(linkage.ground_length, a1)
+    bodies = {"crank": _bar_table("AB", linkage.crank_length, make, make.crank_mass)}
+    bodies["coupler"] = _bar_table("BC", linkage.coupler_length, make, make.coupler_mass)
+    if linkage.point_distance and not linkage.point_is_pin:
+        point = rect(linkage.point_distance, linkage.point_angle)
+        bodies["coupler"] |= {"points": {"P": _point_entry(point)}, **_coupler_masses(linkage, make)}
+        del bodies["coupler"]["section"]
+    # the angle is not wrapped to a turn, because the position of gears depends on whole turns
+    start = a1 + float(linkage.crank_angle(rotation))
+    crank = {"joint": "A", "start": with_unit(start, "rad"), "speed": with_unit(direction * make.speed, "rad/s")}
+    tables: dict[str, Any] = {
+        "name": "found-linkage",
+        "source": "found by synthesis",
+        "gravity": with_unit(make.gravity, "m/s2"),
+        "ground": {
+            "A": _point_entry(shaft),
+            "E" if linkage.pivot or isinstance(linkage, SliderCrank) else "D": _point_entry(end),
+        },
+        "bodies": bodies,
+        "freedoms": {"crank": crank},
+        "assembly": {"C": linkage.branch},
+    }
+    if isinstance(linkage, SliderCrank):
+        bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
+        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
+    else:
+        bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
+    second = linkage.pivot
+    if isinstance(second, SliderMotion):
+        along = with_unit(a1 + second.guide_angle, "rad")
+        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
+        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": along}}
+        position = with_unit(float(second.series(rotation)), "m")
+        tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
+    elif second is not None:
+        bodies["second"] = _bar_table("ED", second.length, make, None)
+    if isinstance(second, SecondCrank) and second.series.order:
+        angle = with_unit(a1 + float(second.angle(rotation)), "rad")
+        tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
+    elif isinstance(second, SecondCrank):
+        # angle of the second crank while the first crank points along x
+        phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
+        tables["gears"] = {
+            "teeth": {
+                "bodies": ["crank", "second"],
+                "ratio": second.ratio,
+                "phase": with_unit(remainder(phase, tau), "rad"),
+            }
+        }
+    if "slides" in tables and (spring := _spring_table(make)):
+        tables["springs"] = {"slider": {"at": "guide"} | spring}
+    if acting := loads(linkage, make):
+        tables["loads"] = list(acting)
+    return tables
+
+
+def _spring_table(make: MachineSpec) -> dict[str, Any]:
+    """Return spring, damper and friction of the slider as a description has them; without those that are zero."""
+    values = {
+        "stiffness": (make.slider_stiffness, "N/m"),
+        "free": (make.slider_stiffness and make.slider_spring_free_position, "m"),
+        "damping": (make.slider_damping, "N.s/m"),
+        "friction": (make.slider_coulomb_friction, "N"),
+    }
+    return {name: with_unit(value, unit) for name, (value, unit) in values.items() if value}
+
+
+def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
+    """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
+    if not any(make.load):
+        return {}
+    # the coupler point may be one of the coupler's pins
+    point = "C" if linkage.point_is_pin else "P" if linkage.point_distance else "B"
+    return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
+
+
+def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
+    """Return the drive tables of a linkage whose pivot is a second degree of freedom: speeds of crank and pivot over time.
+
+    The arguments are those of `description`. For any other linkage the result is empty, because `description` contains the
+    crank speed.
+    """
+    pivot = linkage.pivot
+    sliding = isinstance(pivot, SliderMotion)
+    if pivot is None or not (sliding or pivot.series.order):
+        return {}
+    speed = direction * make.speed
+    rate = speed / linkage.turns
+    slope, unit = pivot.series.derivative(), "m/s" if sliding else "rad/s"
+    k = np.arange(1, slope.order + 1)
+    waves = {
+        "kind": "harmonics",
+        "amplitudes": [with_unit(rate * a, unit) for a in slope.amplitudes[1:]],
+        "frequencies": [with_unit(w, "rad/s") for w in rate * k],
+        "phases": [with_unit(a, "rad") for a in k * rotation - np.arctan2(slope.sin, slope.cos)[1:]],
+    }
+    if isinstance(pivot, SecondCrank):
+        waves["mean"] = with_unit(speed * pivot.ratio, unit)
+    moved = waves if pivot.series.order else with_unit(0.0, unit)
+    return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": moved}}
+
+
+def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
+    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point; see `link_mass_properties`."""
+    line = make.density * make.width * make.thickness
+    r, a2 = linkage.point_distance, linkage.point_angle
+    straight = is_on_line(linkage.coupler_length, r, a2)
+    links = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
+    made = link_mass_properties(*links, r, a2, line, make.width, straight)
+    made |= make.link_masses(made)
+    centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
+    return {
+        "mass": with_unit(made["coupler_mass"], "kg"),
+        "cog": _point_entry(centre),
+        "inertia": with_unit(made["coupler_inertia"], "kg.m2"),
+    }
+
+
+def _point_entry(z: complex) -> list[Any]:
+    """Return a point as a case file gives it, [x, y] with units; exact zeros are the number 0."""
+    return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
+
+
+def _bar_table(ends: str, length: float, make: MachineSpec, mass: float | None) -> dict[str, Any]:
+    """Return the table of a bar with the section of ``make``, and with ``mass`` (kg) if it is given."""
+    section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
+    table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}
+    return table if mass is None else table | {"mass": with_unit(mass, "kg")}

@@ -1,4 +1,4 @@
-"""Refine linkages for untimed paths: minimise the area or the greatest distance between the whole curve and its target.
+"""Fit linkages by SciPy: by least squares at the stations of a task, by SLSQP to the whole curve of an untimed path.
 
 A least-squares fit at ordered stations cannot cut a corner, and its sum of squares is not an area. Here the curve is the same
 polygon as in the evaluation of a solution. The measure is one of `task.target`: the area of the symmetric difference, the area
@@ -16,14 +16,19 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression, minimize
+from scipy.optimize import isotonic_regression, least_squares, minimize
+
+from linkwork.errors import InputError
 
 from ...numerics.overlap import find_nearest, symmetric_difference
+from ..linkage.kernels import coupler_path_jacobian, link_jacobian
+from ..linkage.linkage import wrap_angles
 from ..result.solution import CURVE
 from ..task.constraint import UNKNOWNS
+from ..task.limits import Limits
 from ..task.target import TargetPath, closed_vertices, hausdorff
-from .program import Program
-from .start import Answer, Start
+from ..task.task import Normal
+from .program import Answer, Program, Start, clip_to_bounds
 
 FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
@@ -41,6 +46,116 @@ WINDOW, APART = 0.6, 1e-10
 WITHIN = 1e-5
 #: Index of the crank phase, which does not affect a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
+
+
+def residuals(
+    normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
+
+    Returns
+    -------
+    residual : ndarray, shape (m,)
+        n residuals of x, then n of y, then n of the angle, if the task has these targets.
+    jacobian : ndarray, shape (m, 11)
+        Derivatives with respect to `UNKNOWNS`.
+    rate : ndarray, shape (m,)
+        Derivatives with respect to the crank rotation at the residual's station.
+    """
+    n = normal.n
+    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
+    root = np.sqrt(normal.weights)
+    parts, jacobians, rates = [], [], []
+    if normal.points is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        coupler_path_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        for axis, wanted in enumerate((normal.points.real, normal.points.imag)):
+            parts.append(root * (out[axis] - wanted))
+            jacobians.append(root[:, None] * np.column_stack([jacobian[:10, axis].T, np.zeros(n)]))
+            # a rotation of the crank is a change of its phase
+            rates.append(root * jacobian[8, axis])
+    if normal.angle is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        link_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        which = 1 if normal.of_rocker else 0
+        turned = 0.0 if normal.of_rocker else q[7]
+        left = out[which] + turned + q[10] - normal.angle
+        own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
+        own[:, 7] += 0.0 if normal.of_rocker else 1.0
+        factor = normal.leverage * root
+        parts.append(factor * wrap_angles(left))
+        jacobians.append(factor[:, None] * own)
+        rates.append(factor * jacobian[8, which])
+    return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
+
+
+def sum_of_squares(normal: Normal, start: Start) -> float:
+    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite if the links cannot be joined."""
+    rotation = normal.rotation if start.rotation is None else start.rotation
+    assert rotation is not None
+    residual = residuals(normal, start.branch, start.q, rotation)[0]
+    value = float(residual @ residual)
+    return value if np.isfinite(value) else inf
+
+
+def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
+    """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian."""
+    free = np.nonzero(limits.high > limits.low)[0]
+    timed, n = normal.timed, normal.n
+    base = clip_to_bounds(start.q, limits.low, limits.high)
+    low, high = limits.low[free], limits.high[free]
+    x0 = base[free]
+    # strictly inside, as the method asks
+    x0 = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+    rotation0 = normal.rotation if timed else start.rotation
+    if rotation0 is None:
+        raise InputError("the start of an untimed task needs the crank rotations of its stations")
+    if not timed:
+        x0 = np.append(x0, rotation0)
+        low, high = np.append(low, np.full(n, -inf)), np.append(high, np.full(n, inf))
+    size = len(free)
+    blocks = (normal.points is not None) * 2 + (normal.angle is not None)
+
+    def unpack(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        q = base.copy()
+        q[free] = x[:size]
+        return q, rotation0 if timed else x[size:]
+
+    def value(x: FloatArray) -> FloatArray:
+        found = residuals(normal, start.branch, *unpack(x))
+        # beyond the limit of assembly: residuals larger than any others, so that the step is shortened
+        return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
+
+    def derivative(x: FloatArray) -> FloatArray:
+        _, jacobian, rate = residuals(normal, start.branch, *unpack(x))
+        columns = jacobian[:, free]
+        if timed:
+            return columns
+        own = np.zeros((blocks * n, n))
+        for block in range(blocks):
+            own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
+        return np.hstack([columns, own])
+
+    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpack(x0))):
+        return Answer.for_unjoined_links(start)
+    result = least_squares(
+        value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
+    )
+    q, rotation = unpack(result.x)
+    ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
+    ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
+    ended = replace(start, q=q, rotation=None if timed else rotation)
+    quality = sum_of_squares(normal, ended)
+    return Answer(
+        start=replace(ended, quality=quality),
+        feasible=bool(np.isfinite(quality)) and ordered,
+        converged=bool(result.success),
+        violation=0.0 if ordered else inf,
+        worst="" if ordered else "order of the stations",
+        excess="",
+        status=str(result.message),
+        iterations=int(result.nfev),
+    )
 
 
 class Distances(NamedTuple):
