@@ -18,7 +18,6 @@ from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..libraries import MissingLibraryError
-from ..synthesis import Kind
 from .worker import Busy, Worker
 
 try:
@@ -43,8 +42,6 @@ _LOST_PAGE = f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>lin
 const token = localStorage.getItem("linkwork-token");
 if (token && !location.search) location.replace(`/?token=${{encodeURIComponent(token)}}${{location.hash}}`);
 </script></html>"""
-#: Tag that tells the page that there is a server, and which kinds of linkages it can search.
-_MARK = f'<meta name="linkwork-server" content="{" ".join(get_args(Kind))}">'
 
 _HEADERS = [
     ("Cache-Control", "no-store"),
@@ -87,11 +84,16 @@ class Application:
     """
 
     def __init__(self, page: str, worker: Worker) -> None:
+        # imported here: it takes a second
+        from ..synthesis import Kind
+
         self.worker = worker
         self.token = secrets.token_urlsafe(32)
         #: Host names of this server, set when it listens.
         self.hosts: tuple[str, ...] = ()
-        self.page = page.replace("<title>", f"{_MARK}\n<title>", 1).encode()
+        # a tag tells the page that there is a server, and which kinds of linkages it can search
+        mark = f'<meta name="linkwork-server" content="{" ".join(get_args(Kind))}">'
+        self.page = page.replace("<title>", f"{mark}\n<title>", 1).encode()
         self._lost = _LOST_PAGE.encode()
         self._policy = _POLICY.format(_hashes(page + _LOST_PAGE))
         self._places: dict[str, dict[str, Callable[[Mapping[str, Any]], tuple[HTTPStatus, bytes]]]] = {
