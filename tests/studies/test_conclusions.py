@@ -7,7 +7,7 @@ import pytest
 
 from analysis.studies.statements import HOLDS, Statement
 from analysis.studies.youssef.conclusions_linear import judge_introduction, judge_linearised
-from analysis.studies.youssef.conclusions_motion import decay, maxima_spacings, ranges_after
+from analysis.studies.youssef.conclusions_motion import decay, maxima_spacings, ranges_of_turns
 
 from .results import check, expected
 
@@ -36,5 +36,5 @@ def test_the_transient_of_a_launch_is_no_decay() -> None:
     """The ranges of u (cm) in the turns from the third on, by Lagrange's equation derived automatically and LSODA."""
     earlier = (1.100, 1.100, 1.097, 1.097, 1.097, 1.097, 1.097, 1.097, 1.096, 1.095, 1.093)
     later = (1.090, 1.085, 1.079, 1.069, 1.058, 1.043, 1.024, 1.002, 0.976, 0.948, 0.916)
-    assert ranges_after(1e8, 1e6, 3e4) == pytest.approx(np.array(earlier + later), abs=1e-3)
+    assert ranges_of_turns(1e8, 1e6, 3e4) == pytest.approx(np.array(earlier + later), abs=1e-3)
     assert decay(1e8, 1e6, 3e4) == pytest.approx(sum(later) / sum(earlier), abs=1e-3)

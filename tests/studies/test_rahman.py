@@ -478,7 +478,7 @@ class TestMethod:
         """Not one number is in double precision: it would round what is computed with it less."""
         seen, both = [], forces._both_paths
         monkeypatch.setattr(forces, "_both_paths", lambda *given: seen.append(given) or both(*given))
-        short, long = forces.momenta_at(np.float32), forces.momenta_at(np.float64)
+        short, long = forces.body_momenta(np.float32), forces.body_momenta(np.float64)
         (c, b, q, r), _ = seen
         numbers = [*c, b.g1, b.g2, b.crank_square, *b.masses, *b.rod_squares, *b.slider_squares, *q, *r]
         assert {number.dtype for number in numbers} == {np.dtype(np.float32)}

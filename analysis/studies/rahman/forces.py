@@ -190,7 +190,7 @@ def _rounded(values: Named, kind: type[np.floating[Any]]) -> Named:
     return type(values)(*numbers)
 
 
-def momenta_at(kind: type[np.floating[Any]]) -> FloatArray:
+def body_momenta(kind: type[np.floating[Any]]) -> FloatArray:
     """Return the momenta over a turn in the plane, computed in the precision ``kind`` from numbers of single precision.
 
     The axes of the result are the path as in `_both_paths`, the body (rod, slider), the crank angle, and the component.
@@ -203,7 +203,7 @@ def momenta_at(kind: type[np.floating[Any]]) -> FloatArray:
 
 def _roundoffs() -> list[Judged]:
     """Judge the roundoff errors of momenta in single precision in the plane: by eqs 50a, 51a and by eqs 52a, 53a."""
-    short, long = momenta_at(np.float32), momenta_at(np.float64)
+    short, long = body_momenta(np.float32), body_momenta(np.float64)
     by_forward, by_mixed = np.sqrt(np.mean((short - long) ** 2, axis=-2))
     names = [f"{part}component {axis}" for part in ("", "moment, ") for axis in "ijk"]
     judged = []

@@ -40,7 +40,7 @@ def maxima_spacings(angle: NDArray[np.float64], rate: NDArray[np.float64]) -> ND
 
 
 @cache
-def ranges_after(torque: float, stiffness: float, damping: float) -> NDArray[np.float64]:
+def ranges_of_turns(torque: float, stiffness: float, damping: float) -> NDArray[np.float64]:
     """Return the range of u (cm) in each turn after a launch.
 
     The first two turns are left out: they have the transient of the launch, which also decays without a damper.
@@ -50,7 +50,7 @@ def ranges_after(torque: float, stiffness: float, damping: float) -> NDArray[np.
 
 def decay(torque: float, stiffness: float, damping: float) -> float:
     """Return the mean range of u in the later half of the turns after a launch, relative to that in the earlier half."""
-    swing = ranges_after(torque, stiffness, damping)
+    swing = ranges_of_turns(torque, stiffness, damping)
     half = swing.size // 2
     return float(swing[half:].mean() / swing[:half].mean())
 
@@ -186,7 +186,7 @@ def judge_launches() -> tuple[Statement, ...]:
     maxima = [maxima_spacings(run["crank.angle"], run["slider.velocity"]) for run in runs]
     fastest = max(run_peak(run_acceleration(*which)).angle for which in LAUNCHES)
     torque, stiffness = max(LAUNCHES, key=lambda which: decay(which[0], which[1], DAMPED))
-    first, *_, last = ranges_after(torque, stiffness, DAMPED)
+    first, *_, last = ranges_of_turns(torque, stiffness, DAMPED)
     undamped = min(decay(*which, 0.0) for which in LAUNCHES if which not in FOLDING)
     return (
         Statement(
