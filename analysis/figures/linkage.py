@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Arc, Circle, Polygon
+from matplotlib.patches import Arc
 from numpy.typing import ArrayLike, NDArray
 from shapely import MultiLineString
 
@@ -24,6 +24,17 @@ from . import style
 from .animation import check_frames, gif
 from .dispatch import draw_mechanism, last_samples, plot
 from .marks import roomiest_position
+from .symbols import (
+    CENTRE_LINE,
+    draw_bearing,
+    draw_block,
+    draw_damper,
+    draw_ground,
+    draw_line,
+    draw_link,
+    draw_pin,
+    draw_spring,
+)
 
 #: Least angle (deg) between the letter of the crank angle and the ground link, so that the crank does not cover it.
 _LEAST_TURN = 32.0
@@ -102,7 +113,7 @@ class _Scene:
 
     def draw(self, axis: Axes, q: _Pins, *, letters: bool = True, trace: NDArray[np.float64] | None = None) -> None:
         """Draw the whole mechanism at one configuration; ``trace`` is the path of P in cm, shape (n, 2)."""
-        self._ground(axis, letters)
+        self._ground(axis)
         if trace is not None and len(trace):
             axis.plot(*trace.T, color=style.TRACE, linewidth=style.LINE, zorder=2, solid_capstyle="round")
         self._slider(axis, q)
@@ -110,83 +121,32 @@ class _Scene:
         if letters:
             self._letters(axis, q)
 
-    def _line(self, axis: Axes, points: Sequence[NDArray[np.float64]], **options: Any) -> None:
-        look: dict[str, Any] = {"color": style.GROUND, "linewidth": style.LINE, "solid_capstyle": "butt"}
-        axis.plot(*np.array(points).T, **look | options)
-
-    def _hatch(self, axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], count: int) -> None:
-        """Draw the ground: short strokes to the right of the line from start to end."""
-        way = (end - start) / hypot(*(end - start))
-        stroke = 0.55 * self.unit * (np.array([way[1], -way[0]]) - way)
-        feet = [start + share * (end - start) for share in (np.arange(count) + 0.9) / count]
-        gap = np.full(2, np.nan)
-        points = [point for foot in feet for point in (foot, foot + stroke, gap)]
-        self._line(axis, points, linewidth=style.HAIR, zorder=1)
-
-    def _ground(self, axis: Axes, letters: bool) -> None:
-        unit = self.unit
-        self._line(
-            axis, [np.zeros(2), self.zero], linewidth=style.HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0
-        )
-        # the bearing of A
-        foot, half = -1.75 * unit, 1.0 * unit
-        bearing = np.array([[-0.3 * unit, 0.0], [-half, foot], [half, foot], [0.3 * unit, 0.0]])
-        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=style.GROUND, linewidth=style.LINE, zorder=5))
-        ends = np.array([-1.5 * unit, foot]), np.array([1.5 * unit, foot])
-        self._line(axis, ends)
-        self._hatch(axis, *ends, count=6)
+    def _ground(self, axis: Axes) -> None:
+        draw_line(axis, [np.zeros(2), self.zero], **CENTRE_LINE)
+        draw_bearing(axis, np.zeros(2), self.unit)
         # the guide, below the slider, and the wall at its end
-        end = self.wall if self.sprung or self.damped else self.most + 3.0 * unit
-        self._line(axis, self.rail, zorder=1)
-        self._hatch(axis, *self.rail, count=max(4, round((end - self.least) / unit * 1.6)))
+        draw_ground(axis, *self.rail, self.unit, zorder=1)
         if self.sprung or self.damped:
-            wall = self.point(end, -unit), self.point(end, 1.5 * unit)
-            self._line(axis, wall)
-            self._hatch(axis, *wall, count=5)
+            draw_ground(axis, self.point(self.wall, -self.unit), self.point(self.wall, 1.5 * self.unit), self.unit)
 
     def _slider(self, axis: Axes, q: _Pins) -> None:
-        unit = self.unit
-        block = [self.point(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        axis.add_patch(Polygon(block, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
-        start, end = q.u + 1.5 * unit, self.wall
+        unit, start = self.unit, q.u + 1.5 * self.unit
+        draw_block(axis, self.point(q.u, 0.0), self.along, unit)
         side = 0.55 * unit if self.sprung and self.damped else 0.0
         if self.sprung:
-            share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 15)[1:-1], [0.88, 1.0]])
-            swing = np.zeros(len(share))
-            swing[2:-2] = 0.38 * unit * (-1.0) ** np.arange(len(share) - 4)
-            spring = [self.point(start + s * (end - start), side + w) for s, w in zip(share, swing)]
-            self._line(axis, spring, color=style.SLIDER, linewidth=style.LINE, zorder=3)
+            draw_spring(axis, self.point(start, side), self.point(self.wall, side), unit)
         if self.damped:
-            middle, width, deep = 0.5 * (start + end), 0.32 * unit, 1.6 * unit
-            cup = ((-0.5, 1), (0.5, 1), (0.5, -1), (-0.5, -1))
-            self._line(
-                axis, [self.point(middle + s * deep, w * width - side) for s, w in cup], color=style.SLIDER, zorder=3
-            )
-            self._line(
-                axis, [self.point(middle + 0.5 * deep, -side), self.point(end, -side)], color=style.SLIDER, zorder=3
-            )
-            self._line(axis, [self.point(start, -side), self.point(middle, -side)], color=style.SLIDER, zorder=3)
-            piston = [self.point(middle, w * width - side) for w in (-0.8, 0.8)]
-            self._line(axis, piston, color=style.SLIDER, linewidth=style.BOLD, zorder=3)
+            draw_damper(axis, self.point(start, -side), self.point(self.wall, -side), unit)
 
     def _links(self, axis: Axes, q: _Pins) -> None:
-        a = np.zeros(2)
-        width = {"linewidth": 4.5, "solid_capstyle": "round"}
-        offset = abs(float(np.cross(np.append(q.c - q.b, 0.0), np.append(q.p - q.b, 0.0))[2]))
-        if offset > 0.02 * hypot(*(q.c - q.b)) ** 2:
-            axis.add_patch(Polygon([q.b, q.c, q.p], facecolor=style.COUPLER, alpha=0.16, edgecolor="none", zorder=5))
-            self._line(axis, [q.b, q.p, q.c], color=style.COUPLER, linewidth=style.LINE, zorder=6)
-        elif self.parameters.coupler_point_distance:
-            self._line(axis, [q.b, q.p], color=style.COUPLER, **width, zorder=6)
-        self._line(axis, [q.d, q.c], color=style.ROCKER, **width, zorder=6)
-        self._line(axis, [q.b, q.c], color=style.COUPLER, **width, zorder=7)
-        self._line(axis, [a, q.b], color=style.CRANK, **width, zorder=8)
-        dots = [(pin, 0.36, "white", 1.2, 9) for pin in (a, q.b, q.c, q.d)]
-        if self.parameters.coupler_point_distance:
-            dots.append((q.p, 0.24, style.TRACE, 0.9, 10))
-        for pin, radius, colour, edge, order in dots:
-            look = {"facecolor": colour, "edgecolor": "black", "linewidth": edge, "zorder": order}
-            axis.add_patch(Circle((pin[0], pin[1]), radius * self.unit, **look))
+        a, traced = np.zeros(2), bool(self.parameters.coupler_point_distance)
+        draw_link(axis, [q.d, q.c], style.ROCKER, zorder=5)
+        draw_link(axis, [q.b, q.c, *([q.p] if traced else [])], style.COUPLER)
+        draw_link(axis, [a, q.b], style.CRANK, zorder=7)
+        for pin in (a, q.b, q.c, q.d):
+            draw_pin(axis, pin, self.unit)
+        if traced:
+            draw_pin(axis, q.p, self.unit, style.TRACE, zorder=10)
 
     def _letters(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
@@ -218,7 +178,7 @@ class _Scene:
         # the slider position
         level = -2.35 * unit
         for s in {0.0, q.u}:
-            self._line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=style.HAIR)
+            draw_line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=style.HAIR)
         if abs(q.u) > 1.2 * unit:
             arrow = {"arrowstyle": "-|>", "color": style.GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": style.HAIR}
             axis.annotate("", tuple(self.point(q.u, level)), tuple(self.point(0.0, level)), arrowprops=arrow)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from linkwork.mechanism import Mechanism, Part
@@ -22,13 +21,11 @@ from .animation import check_frames, gif
 from .dispatch import animate, last_samples, plot
 from .marks import roomiest_position
 from .style import (
-    BLOCK,
     COLOURS,
-    DOT,
-    GROUND,
-    HAIR,
-    LINE,
+    COUPLER,
+    CRANK,
     MARKED,
+    ROCKER,
     SMALL,
     THIN,
     TRACE,
@@ -37,9 +34,21 @@ from .style import (
     finish,
     write_title,
 )
+from .symbols import (
+    CENTRE_LINE,
+    draw_bearing,
+    draw_block,
+    draw_damper,
+    draw_line,
+    draw_link,
+    draw_pin,
+    draw_spring,
+)
 
 Array = NDArray[np.float64]
 _SIDE = 5.0
+#: Colours of links by name; other links have the other colours of curves in turn.
+_NAMED = {"crank": CRANK, "coupler": COUPLER, "rod": COUPLER, "rocker": ROCKER}
 #: Number of configurations along a path.
 _TRACED = 240
 
@@ -77,16 +86,22 @@ def draw(
     unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0)))
     for name in drawing.paths:
         axis.plot(*positions[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
-    colours = cycle(COLOURS)
+    taken = {TRACE, *(_NAMED[part.text] for part in drawing.parts if part.text in _NAMED)}
+    others = cycle(colour for colour in dict.fromkeys((*_NAMED.values(), *COLOURS)) if colour not in taken)
     for part in drawing.parts:
         if not part.where or getattr(parameters, field_name(part.where), 0.0) != 0.0:
-            _draw_part(axis, part, [now[name] for name in part.joints], unit, colours)
-    shown = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")} | set(
-        drawing.paths
-    )
-    pins = {joint.name: now[joint.name] for joint in drawing.joints if joint.name in shown and not joint.aid}
-    for x, y in pins.values():
-        axis.plot(x, y, "o", markersize=DOT, markerfacecolor="white", markeredgecolor=GROUND, zorder=6)
+            colour = (_NAMED.get(part.text) or next(others)) if part.kind == "link" else ""
+            _draw_part(axis, part, [positions[name] for name in part.joints], unit, colour)
+    joined = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")}
+    pins = {
+        joint.name: now[joint.name]
+        for joint in drawing.joints
+        if joint.name in joined | set(drawing.paths) and not joint.aid
+    }
+    carried = [name for part in drawing.parts if part.kind == "link" for name in part.joints]
+    for name, pin in pins.items():
+        marked = name in drawing.paths and carried.count(name) < 2
+        draw_pin(axis, pin, unit, TRACE if marked else "white", zorder=10.0 if marked else 9.0)
     if letters:
         _write_letters(axis, pins, unit)
     axis.set_aspect("equal", adjustable="datalim")
@@ -105,54 +120,42 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     drawn = [shape for shape in (*lines, *edges) if np.isfinite(shape.bounds).all()]
     taken = list(pins.values())
     for name, pin in pins.items():
-        place = roomiest_position(pin, 1.3 * unit, drawn, taken)
+        place = roomiest_position(pin, 1.7 * unit, drawn, taken)
         taken.append(place)
         axis.text(
             float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
         )
 
 
-def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:
-    """Draw a part; ``through`` are the positions of its joints (mm), ``unit`` the size of symbols (mm)."""
+def _draw_part(axis: Axes, part: Part, paths: Sequence[Array], unit: float, colour: str) -> None:
+    """Draw a part; ``paths`` are the positions (mm) of its joints at all configurations, ``unit`` the size of symbols (mm)."""
+    through = [path[0] for path in paths]
     first, last = through[0], through[-1]
     if part.kind == "link":
-        colour = next(colours)
-        if len(through) > 2:
-            axis.add_patch(
-                Polygon(
-                    _sort_by_angle(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3
-                )
-            )
-        axis.plot(*np.array(through).T, color=colour, linewidth=2.0 * LINE, solid_capstyle="round", zorder=4)
+        draw_link(axis, through, colour)
     elif part.kind == "pivot":
-        base = np.array([[0.0, 0.0], [-unit, -1.6 * unit], [unit, -1.6 * unit]])
-        axis.add_patch(Polygon(first + base, facecolor="0.85", edgecolor=GROUND, linewidth=THIN, zorder=1))
+        draw_bearing(axis, first, unit)
     elif part.kind in ("guide", "axis"):
-        style = "-." if part.kind == "guide" else ":"
-        axis.plot(*np.array([first, last]).T, color="0.6", linewidth=HAIR, linestyle=style, zorder=1)
+        draw_line(axis, [first, last], **CENTRE_LINE)
     elif part.kind == "gear":
         # the radius to the second point, and the circle through it
         turns = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73)) * complex(*(last - first))
         rim = first + np.column_stack([turns.real, turns.imag])
-        axis.plot(*np.vstack([first, rim]).T, color="0.5", linewidth=THIN, zorder=2)
-    elif part.kind in ("slider", "spring"):
+        draw_line(axis, np.vstack([first, rim]), color="0.5", linewidth=THIN, zorder=2)
+    else:
         along = (through[2] - through[1]) / np.linalg.norm(through[2] - through[1])
-        across = np.array([-along[1], along[0]])
         if part.kind == "slider":
-            signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-            corners = [first + 1.5 * a * unit * along + 0.9 * b * unit * across for a, b in signs]
-            axis.add_patch(Polygon(corners, facecolor=BLOCK, edgecolor=GROUND, linewidth=THIN, zorder=3))
+            draw_block(axis, first, along, unit)
         else:
-            wave = 0.5 * unit * np.array([0.0, 0.0, *([1.0, -1.0] * 5), 0.0, 0.0])
-            coil = first + np.outer(np.linspace(0.0, 5.0 * unit, len(wave)), along) + np.outer(wave, across)
-            axis.plot(*coil.T, color="0.5", linewidth=THIN, zorder=2)
-
-
-def _sort_by_angle(points: Sequence[Array]) -> Array:
-    """Return points sorted by their angles about their mean."""
-    array = np.array(points)
-    spread = array - array.mean(axis=0)
-    return array[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))]
+            # from the block to a wall that it does not reach; side by side if there are both
+            across = np.array([-along[1], along[0]])
+            travel = np.nanmax((paths[0] - paths[1]) @ along) - (first - through[1]) @ along
+            side = (0.55 if part.kind == "spring" else -0.55) * unit * across
+            wall = first + (travel + 8.0 * unit) * along
+            (draw_spring if part.kind == "spring" else draw_damper)(
+                axis, first + 1.5 * unit * along + side, wall + side, unit
+            )
+            draw_line(axis, [wall - 1.3 * unit * across, wall + 1.3 * unit * across], zorder=3)
 
 
 def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:

@@ -15,7 +15,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from shapely import MultiLineString, MultiPoint
@@ -28,6 +27,7 @@ from . import style
 from .animation import check_frames, gif
 from .dispatch import animate, plot
 from .marks import roomiest_position
+from .symbols import CENTRE_LINE, draw_bearing, draw_block, draw_line, draw_link, draw_pin
 
 FloatArray = NDArray[np.float64]
 
@@ -67,21 +67,6 @@ def _set_one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
     axis.set_ylabel("y [mm]")
 
 
-def _draw_line(axis: Axes, points: Any, **options: Any) -> None:
-    look: dict[str, Any] = {"color": style.GROUND, "linewidth": style.LINE, "solid_capstyle": "round"}
-    axis.plot(*np.array(points).T, **look | options)
-
-
-def _draw_support(axis: Axes, pin: FloatArray, unit: float) -> None:
-    """Draw the bearing of a fixed pin."""
-    foot, half = pin[1] - 1.5 * unit, 0.85 * unit
-    corners = np.array([pin, [pin[0] - half, foot], [pin[0] + half, foot]])
-    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=style.GROUND, linewidth=style.THIN, zorder=5))
-    _draw_line(axis, [(pin[0] - 1.3 * unit, foot), (pin[0] + 1.3 * unit, foot)], linewidth=style.THIN, zorder=5)
-    for x in np.linspace(pin[0] - 0.9 * unit, pin[0] + 1.3 * unit, 5):
-        _draw_line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=style.HAIR, zorder=5)
-
-
 def _draw_target(axis: Axes, scene: syn.LinkageScene, *, size: float = 3.0) -> None:
     if scene.target is None:
         return
@@ -115,30 +100,23 @@ def _draw_linkage(
     at = {name: MM_PER_METRE * np.array(place) for name, place in pins.items()}
     a, b, c, d, e = (at[name] for name in "ABCDE")
     p = at.get("P")
-    link: dict[str, Any] = {"linewidth": 3.6 if letters else 2.4}
-    _draw_line(axis, [a, e], linewidth=style.HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
-    _draw_support(axis, a, unit)
+    wide = 3.6 if letters else 2.4
+    draw_line(axis, [a, e], **CENTRE_LINE)
+    draw_bearing(axis, a, unit)
     if scene.guide is not None:
         _draw_slider(axis, MM_PER_METRE * scene.guide, scene.guide_directions(), d, unit)
     else:
-        _draw_support(axis, e if scene.second_crank else d, unit)
+        draw_bearing(axis, e if scene.second_crank else d, unit)
     if scene.second_crank:
-        _draw_line(axis, [e, d], color=style.CRANK, zorder=8, **link)
-    if p is not None:
-        axis.add_patch(Polygon([b, c, p], facecolor=style.COUPLER, alpha=0.14, edgecolor="none", zorder=5))
-        _draw_line(axis, [b, p, c], color=style.COUPLER, linewidth=style.LINE, zorder=6)
+        draw_link(axis, [e, d], style.CRANK, wide=wide, zorder=7)
     if not isinstance(scene.linkage, syn.SliderCrank):
-        _draw_line(axis, [d, c], color=style.ROCKER, zorder=6, **link)
-    _draw_line(axis, [b, c], color=style.COUPLER, zorder=7, **link)
-    _draw_line(axis, [a, b], color=style.CRANK, zorder=8, **link)
+        draw_link(axis, [d, c], style.ROCKER, wide=wide, zorder=5)
+    draw_link(axis, [b, c, *([] if p is None else [p])], style.COUPLER, wide=wide)
+    draw_link(axis, [a, b], style.CRANK, wide=wide, zorder=7)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
-        axis.add_patch(
-            Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=style.THIN, zorder=9)
-        )
+        draw_pin(axis, pin, unit)
     if p is not None:
-        axis.add_patch(
-            Circle(tuple(p), 0.32 * unit, facecolor=style.TRACE, edgecolor="black", linewidth=style.THIN, zorder=10)
-        )
+        draw_pin(axis, p, unit, style.TRACE, zorder=10)
     if letters:
         _write_letters(axis, scene, at, unit)
 
@@ -147,11 +125,10 @@ def _draw_slider(
     axis: Axes, guide: FloatArray, directions: tuple[FloatArray, FloatArray], d: FloatArray, unit: float
 ) -> None:
     along, left = directions
-    for side in (-0.8, 0.8):
+    for side in (-1.0, 1.0):
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
-        _draw_line(axis, rail, linewidth=style.THIN, zorder=3)
-    block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    axis.add_patch(Polygon(block, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
+        draw_line(axis, rail, linewidth=style.THIN, zorder=3)
+    draw_block(axis, d, along, unit)
 
 
 def _write_letters(axis: Axes, scene: syn.LinkageScene, pins: Mapping[str, FloatArray], unit: float) -> None:
@@ -558,7 +535,7 @@ def animate_solution(
                         artist.remove()
                 if "P" in pins:
                     trace.append(MM_PER_METRE * np.array(pins["P"]))
-                    _draw_line(above, trace, color=style.TRACE, linewidth=style.BOLD, zorder=4)
+                    draw_line(above, trace, color=style.TRACE, linewidth=style.BOLD, zorder=4)
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])
