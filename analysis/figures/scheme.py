@@ -88,10 +88,16 @@ def draw(
         axis.plot(*positions[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
     taken = {TRACE, *(_NAMED[part.text] for part in drawing.parts if part.text in _NAMED)}
     others = cycle(colour for colour in dict.fromkeys((*_NAMED.values(), *COLOURS)) if colour not in taken)
-    for part in drawing.parts:
-        if not part.where or getattr(parameters, field_name(part.where), 0.0) != 0.0:
+    drawn = [p for p in drawing.parts if not p.where or getattr(parameters, field_name(p.where), 0.0) != 0.0]
+    damped = {part.joints for part in drawn if part.kind == "damper"}
+    for part in drawn:
+        paths = [positions[name] for name in part.joints]
+        if part.kind in ("spring", "damper"):
+            alone = part.kind == "spring" and part.joints not in damped
+            _draw_suspension(axis, part.kind, paths, unit, 0.0 if alone else 0.55)
+        else:
             colour = (_NAMED.get(part.text) or next(others)) if part.kind == "link" else ""
-            _draw_part(axis, part, [positions[name] for name in part.joints], unit, colour)
+            _draw_part(axis, part, [path[0] for path in paths], unit, colour)
     joined = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")}
     pins = {
         joint.name: now[joint.name]
@@ -127,35 +133,38 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
         )
 
 
-def _draw_part(axis: Axes, part: Part, paths: Sequence[Array], unit: float, colour: str) -> None:
-    """Draw a part; ``paths`` are the positions (mm) of its joints at all configurations, ``unit`` the size of symbols (mm)."""
-    through = [path[0] for path in paths]
+def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colour: str) -> None:
+    """Draw a part; ``through`` are the positions of its joints (mm), ``unit`` the size of symbols (mm)."""
     first, last = through[0], through[-1]
     if part.kind == "link":
         draw_link(axis, through, colour)
     elif part.kind == "pivot":
         draw_bearing(axis, first, unit)
-    elif part.kind in ("guide", "axis"):
-        draw_line(axis, [first, last], **CENTRE_LINE)
+    elif part.kind == "slider":
+        draw_block(axis, first, (last - through[1]) / np.linalg.norm(last - through[1]), unit)
     elif part.kind == "gear":
         # the radius to the second point, and the circle through it
         turns = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73)) * complex(*(last - first))
         rim = first + np.column_stack([turns.real, turns.imag])
         draw_line(axis, np.vstack([first, rim]), color="0.5", linewidth=THIN, zorder=2)
     else:
-        along = (through[2] - through[1]) / np.linalg.norm(through[2] - through[1])
-        if part.kind == "slider":
-            draw_block(axis, first, along, unit)
-        else:
-            # from the block to a wall that it does not reach; side by side if there are both
-            across = np.array([-along[1], along[0]])
-            travel = np.nanmax((paths[0] - paths[1]) @ along) - (first - through[1]) @ along
-            side = (0.55 if part.kind == "spring" else -0.55) * unit * across
-            wall = first + (travel + 8.0 * unit) * along
-            (draw_spring if part.kind == "spring" else draw_damper)(
-                axis, first + 1.5 * unit * along + side, wall + side, unit
-            )
-            draw_line(axis, [wall - 1.3 * unit * across, wall + 1.3 * unit * across], zorder=3)
+        draw_line(axis, [first, last], **CENTRE_LINE)
+
+
+def _draw_suspension(axis: Axes, kind: str, paths: Sequence[Array], unit: float, side: float) -> None:
+    """Draw a spring or damper from a block to a wall that the block does not reach.
+
+    ``paths`` are the positions (mm) of the block and of two points in its direction at all configurations; ``side`` is the
+    distance of a spring to the left of the line, and of a damper to its right, in units.
+    """
+    block, start, end = (path[0] for path in paths)
+    along = (end - start) / np.linalg.norm(end - start)
+    across = unit * np.array([-along[1], along[0]])
+    travel = np.nanmax((paths[0] - paths[1]) @ along) - (block - start) @ along
+    wall = block + (travel + 8.0 * unit) * along
+    symbol, shift = (draw_spring, side * across) if kind == "spring" else (draw_damper, -side * across)
+    symbol(axis, block + 1.5 * unit * along + shift, wall + shift, unit)
+    draw_line(axis, [wall - 1.3 * across, wall + 1.3 * across], zorder=3)
 
 
 def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:

@@ -14,9 +14,10 @@ from matplotlib.text import Text
 from PIL import Image
 
 from analysis import Inputs, figures, simulate, simulate_many
-from analysis.figures import Curve, Panel
+from analysis.figures import Curve, Panel, scheme
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
+from analysis.figures.style import GROUND
 from analysis.files import WritingError, save_figure
 from analysis.mechanisms import MECHANISMS
 from linkwork.errors import AssemblyError, InputError
@@ -282,6 +283,23 @@ def test_drawing_holds_all_pins(parameters, tmp_path: Path) -> None:
 def test_drawing_what_cannot_be_joined() -> None:
     with pytest.raises(AssemblyError, match=r"slider position 0\.5 m"):
         figures.plot(TABLE_3_1, 0.0, 0.5)
+
+
+def test_a_scheme_has_spring_and_damper_and_a_wall_that_the_slider_does_not_reach() -> None:
+    """A spring and a damper of cup, two rods and piston have a line more, for their wall."""
+    coordinates = np.array([(1.0, 0.0), (1.0, 0.02), (1.0, -0.01)])
+    count, walls = [], []
+    for stiffness, damping in ((0.0, 0.0), (1e3, 0.0), (1e3, 5.0)):
+        parameters = replace(WITH_POINT, slider_stiffness=stiffness, slider_damping=damping)
+        positions = scheme.joint_positions(MECHANISMS["five-bar"], parameters, coordinates)
+        axis = figures.Figure().add_subplot()
+        scheme.draw(axis, MECHANISMS["five-bar"], parameters, positions)
+        count.append(len(axis.lines))
+        upright = [line.get_xdata() for line in axis.lines if line.get_color() == GROUND]
+        walls += [x[0] for x in upright if len(x) == 2 and x[0] == x[1]]
+    assert np.diff(count).tolist() == [2, 5]
+    assert walls == pytest.approx([walls[0]] * 3)
+    assert walls[0] > positions["D"][:, 0].max() + 0.1 * np.ptp(positions["B"], axis=0).max()
 
 
 def test_animation(run, tmp_path: Path) -> None:
