@@ -442,21 +442,23 @@ def forward_rod_momentum(c: Crank, b: Bodies, q: Joints, r: Joints) -> Dual:
     )
 
 
-def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) -> tuple[Dual, Dual, Dual]:
-    """Return the dual momenta by eqs 49a, 52a and 53a with g3 = 0; ``slip`` keeps the printed g3 for g2 in 52a (erratum 9)."""
+def momenta(
+    c: Crank, b: Bodies, q: Joints, r: Joints, *, g3: float = 0.0, slip: bool = False
+) -> tuple[Dual, Dual, Dual]:
+    """Return the dual momenta by eqs 49a, 52a and 53a; ``slip`` keeps the printed g3 for g2 in 52a (erratum 9)."""
     (_, m2, m3), (_, k2y, k2z), c3 = b.masses, b.rod_squares, np.cos(q.th3)
     return (
         crank_momentum(c, b),
         _dual(
-            [-m2 * r.s4 * np.sin(q.th3), m2 * (r.s4 * c3 - b.g2 * r.th3), 0.0 if slip else m2 * b.g2 * r.eta3],
+            [-m2 * r.s4 * np.sin(q.th3), m2 * (r.s4 * c3 - b.g2 * r.th3), m2 * (g3 if slip else b.g2) * r.eta3],
             [0.0, -m2 * k2y * r.eta3, m2 * (b.g2 * r.s4 * c3 - k2z * r.th3)],
         ),
-        _dual([0.0, 0.0, -m3 * r.s4], [0.0, 0.0, 0.0]),
+        _dual([0.0, 0.0, -m3 * r.s4], [0.0, m3 * g3 * r.s4, 0.0]),
     )
 
 
-def momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
-    """Return the rates of the dual momenta by eqs 54, 57 and 58, with g3 = 0."""
+def momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, *, g3: float = 0.0) -> tuple[Dual, Dual, Dual]:
+    """Return the rates of the dual momenta by eqs 54, 57 and 58."""
     (_, m2, m3), (_, k2y, k2z), s3, c3 = b.masses, b.rod_squares, np.sin(q.th3), np.cos(q.th3)
     turned = a.s4 * c3 - r.s4 * s3 * r.th3
     return (
@@ -465,7 +467,7 @@ def momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> tupl
             [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
             [0.0, -m2 * k2y * a.eta3, m2 * (b.g2 * turned - k2z * a.th3)],
         ),
-        _dual([0.0, 0.0, -m3 * a.s4], [0.0, 0.0, 0.0]),
+        _dual([0.0, 0.0, -m3 * a.s4], [0.0, m3 * g3 * a.s4, 0.0]),
     )
 
 

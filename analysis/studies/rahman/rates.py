@@ -330,12 +330,13 @@ def _abnormal() -> Statement:
         "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
         "the computer calculations, which is clearly inaccurate.",
         text("section 3.2, L1115"),
-        f"{full_name(case)}, where the printed iteration ends. First theta2 at the angles where its sine vanishes. Then the "
-        f"greatest acceleration within {ABOUT_DEG:g} deg of a dead centre relative to the greatest elsewhere, at every half "
-        f"degree and {BESIDE_DEG:g} deg, our choice, beside those angles. Last the greatest share of an acceleration, at "
-        "every half degree, that is roundoff in double precision",
+        f"{full_name(case)}, where the printed iteration ends. First theta2 at {BESIDE_DEG:g} deg (our choice) before the "
+        f"angles at which its sine vanishes. Then the greatest acceleration within {ABOUT_DEG:g} deg of a dead centre, "
+        f"relative to the greatest elsewhere, at every half degree and at {BESIDE_DEG:g} deg before and after those angles. "
+        "Last the greatest roundoff of an acceleration in double precision, at every half degree, relative to the greatest "
+        "acceleration by the same equation",
         f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; a share of one "
-        "half, for *on account of*",
+        "half, our choice, for *on account of*",
         (
             *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
             *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
