@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from analysis.cli import main
 from analysis.numerics.decay import fit_decay
 from analysis.periodic import Crossing, mean_effective_mass, natural_frequency
-from analysis.studies.youssef import instruments, rig_1, rig_2, rigs
+from analysis.studies.youssef import chapter_8, instruments, rig_1, rig_2, rigs
 from analysis.studies.youssef.runs import SteadyTurn, steady_turn
 from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar.published import SETS
@@ -162,6 +162,12 @@ class TestRig1:
         assert steady_turn(rigs.rig("A"), 460.0).peaks == 2
         # with spring B too, at the same fraction of its natural frequency
         assert rigs.speed_of_fewer_peaks("B", 800.0, 900.0) == pytest.approx(847.0, abs=1.0)
+
+    def test_the_last_peak_of_a_turn_nears_the_first_of_the_next(self) -> None:
+        """Angles (deg) from a program of its own, in cgs units, that shoots for the motion and has 7200 samples in a turn."""
+        found = {580.0: 89.85, 600.0: 83.60, 620.0: 78.95, 660.0: 71.15, 680.0: 67.35, 720.0: 59.20, 780.0: 43.80}
+        angles = [chapter_8._fall_angle(rigs.turn("B", speed)) for speed in found]
+        assert angles == pytest.approx(list(found.values()), abs=0.06)
 
     @pytest.mark.parametrize(("rpm", "peaks"), [(150.0, 8), (200.0, 6), (250.0, 4), (500.0, 2)])
     def test_peaks(self, rpm: float, peaks: int) -> None:

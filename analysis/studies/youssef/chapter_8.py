@@ -424,9 +424,12 @@ def _fig_8_17() -> tuple[Statement, ...]:
 
 def _fall_angle(found: Turn) -> float:
     """Return the crank angle (deg) from the last maximum of the slider position in a turn to the minimum after it."""
-    rising = np.diff(rigs.slider(found)) > 0.0
-    tops, lows = (np.flatnonzero(x & ~np.roll(x, -1)) for x in (rising, ~rising))
-    return float(((lows - tops[-1]) % len(rising)).min()) * 360.0 / len(rising)
+    slope = np.diff(rigs.slider(found))
+    after, rising = np.roll(slope, -1), slope > 0.0
+    ends = (np.flatnonzero(x & ~np.roll(x, -1)) for x in (rising, ~rising))
+    # between the samples, where the slope vanishes
+    tops, lows = (at + slope[at] / (slope[at] - after[at]) for at in ends)
+    return float(((lows - tops[-1]) % len(slope)).min()) * 360.0 / len(slope)
 
 
 #: Speeds at which rig 2 is shown (rpm).

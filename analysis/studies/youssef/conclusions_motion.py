@@ -143,7 +143,7 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             text("9.1, L7077"),
             "greatest change of the oscillation about the drift from turn to turn, as at L1907; distance of u at the ends "
             "of the turns from a line, as at L1911; number of turns until coupler and rocker are within "
-            f"{degrees(asin(COLLINEAR_SINE)):.0f} deg of a straight line (our choice)",
+            f"{degrees(asin(COLLINEAR_SINE)):.1f} deg of a straight line (our choice)",
             f"{ALIKE:g}, the rule for *steady* and *linear*; {FEWEST_TURNS} turns, two for the transient and two to compare; "
             f"{MOST_TURNS} turns, as many as we run",
             (

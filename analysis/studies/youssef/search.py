@@ -315,9 +315,9 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
             text("6.3.1, L4328-4334"),
             "greatest error divided by least error, first of the ends of these searches, which the thesis calls located "
             f"minima, then of the minima for {COUNTED[0]} points, found as in the row at L4345. Number of the searches that "
-            "miss the best of their ends",
-            f"{1.0 + ALIKE:g}, the rule for *the same*, where one case is enough for *may*; one search that misses is enough "
-            "for *necessary*",
+            f"miss the best of their ends by more than {100 * SMALL:g} %",
+            f"{1.0 + ALIKE:g}, the rule for *the same*, where one case is enough for *may*; {100 * SMALL:g} %, the rule for "
+            "*small*, where one search that misses is enough for *necessary*",
             (
                 at_least("ends of the searches", 1.0 + ALIKE, ends.max() / ends.min()),
                 at_least(f"minima for {COUNTED[0]} points", 1.0 + ALIKE, few[-1] / few[0]),

@@ -259,13 +259,15 @@ def _rocker() -> tuple[Statement, ...]:
         Statement(
             "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
             text("7.3.2, L5965"),
-            f"least error at {angles} crank angles over the readings of the printed series. The readings differ in its sign, "
-            "that of its sines and of v; in A0, which is whole, a tenth or none; and in the argument, omega t or theta2. "
-            "Each number of links and series is rounded up or down so that the error comes nearest to the stated one",
+            f"least error over the readings of the printed series, with the weighted errors at {angles} crank angles added up "
+            "and divided by 1000. The readings differ in its sign, that of its sines and of v; in A0, which is whole, a tenth "
+            "or none; and in the argument, omega t or theta2. Each number of links and series is rounded up or down so that "
+            "the error comes nearest to the stated one",
             "0.05 deg2, half a unit of the last digit",
             (near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),),
-            f"by the other readings of Fig 6.7, where the 35.0 is judged, the error is {least_read:.2f} or more; with the "
-            f"pivot fixed it is then {fixed[reading]:.2f}",
+            "by the other readings of the angles and weights at Fig 6.7, where the 35.0 is judged, the error is "
+            f"{least_read:.2f} or more; the reading that gives {least_read:.2f} gives {fixed[reading]:.2f} with the pivot "
+            "fixed",
         ),
         Statement(
             "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
