@@ -342,7 +342,7 @@ class Follower:
                     return Curve(tuple(points), tuple(steps), Reason.BOX, Reason.BOX.value)
                 end = Reason.BOX, Reason.BOX.value
             elif len(points) > 3 and self._passes(first, last, point):
-                point, length = first, float((self._scale_point(first) - self._scale_point(last)) @ last.tangent)
+                point, length = first, self.step_length(last, first)
                 end = Reason.CLOSED, "the curve closes"
             points.append(point)
             steps.append(length)
@@ -376,6 +376,31 @@ class Follower:
         The step leads from ``point`` to ``beyond`` and has the given arc length; the test function has opposite signs at these
         points.
         """
+        find_point = self._step_points(point, length, beyond)
+        s = float(scipy.optimize.brentq(lambda s: test(find_point(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
+        return find_point(s), s
+
+    def minimise(
+        self, point: Point, length: float, beyond: Point, test: Callable[[Point], float], enough: float
+    ) -> tuple[Point, float, float]:
+        """Minimise a test function within a step (see `locate`), or find a value below ``enough``.
+
+        Return the point, its distance from the beginning of the step and its value.
+        """
+        find_point = self._step_points(point, length, beyond)
+        found = [(np.inf, 0.0)]
+
+        def value(s: float) -> float:
+            if found[-1][0] >= enough:
+                found.append((test(find_point(s)), s))
+            return found[-1][0]
+
+        scipy.optimize.minimize_scalar(value, bounds=(0.0, length), method="bounded", options={"xatol": 1e-4 * length})
+        least, s = min(found)
+        return find_point(s), s, least
+
+    def _step_points(self, point: Point, length: float, beyond: Point) -> Callable[[float], Point]:
+        """Return a function that finds the point of the curve at a distance along the step from ``point`` to ``beyond``."""
         # the parabola through the end of the step
         bend = 2.0 * (self._scale_point(beyond) - self._scale_point(point) - length * point.tangent) / length**2
 
@@ -391,8 +416,11 @@ class Follower:
                 )
             return self._point(found, point.tangent)
 
-        s = float(scipy.optimize.brentq(lambda s: test(find_point(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
-        return find_point(s), s
+        return find_point
+
+    def step_length(self, point: Point, beyond: Point) -> float:
+        """Return the length of the step between two points, along the tangent at the first."""
+        return float((self._scale_point(beyond) - self._scale_point(point)) @ point.tangent)
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
         """Take a step; return the new point and the number of corrections, or a failure if the step may have left the curve."""

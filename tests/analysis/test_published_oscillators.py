@@ -94,6 +94,20 @@ def test_branches_and_boundaries_find_the_characteristic_values_of_mathieu() -> 
     assert a == pytest.approx(mathieu_a(1, q), abs=1e-8)
 
 
+def test_a_branch_has_the_unstable_windows_that_lie_within_one_of_its_steps() -> None:
+    q, low = 0.05, 0.3
+    family = Family(parameters=mathieu(0.0, q), drive=MATHIEU, vary="rotor.stiffness")
+    branch = follow(family, newton_orbit(mathieu(low, q), MATHIEU), low, low=low, high=8.0)
+    doublings, others = branch.special[:2], branch.special[2:]
+    assert [s.kind for s in branch.special] == [Crossing.PERIOD_DOUBLING] * 2 + [Crossing.BRANCH_POINT] * 2
+    assert [s.parameter for s in doublings] == pytest.approx([mathieu_b(1, q), mathieu_a(1, q)], abs=1e-9)
+    assert [s.parameter for s in others] == pytest.approx([mathieu_b(2, q), mathieu_a(2, q)], abs=1e-7)
+    # of each window the branch has the one point that was inserted
+    unstable = [n for n, word in enumerate(branch.stability()) if word is Stability.UNSTABLE]
+    assert unstable == [special.after for special in branch.special[1::2]]
+    assert (np.diff(branch.parameter) > 0.0).all()
+
+
 # Duffing, hardening: x'' + 0.1 x' + x + 0.04 x^3 = cos w t
 
 DUFFING = torsion.Parameters(rotor_damping=0.1, rotor_stiffness=1.0, rotor_cubic_stiffness=0.04, rotor_excitation=1.0)

@@ -10,6 +10,7 @@ twice the period.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from pathlib import Path
@@ -436,6 +437,7 @@ def _branch(
             follower, first = _divide_period(family, last, settings)
         except OrbitError:
             break
+    pieces = [(own, _insert_dips(curve, own)) for own, curve in pieces]
     located = [_special_points(family, curve, own, pieces[:part]) for part, (own, curve) in enumerate(pieces)]
     # the first point of a piece is the last of the one before
     points = [p for part, (_, curve) in enumerate(pieces) for p in curve.points[min(part, 1) :]]
@@ -474,9 +476,49 @@ def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]
     return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / scale)
 
 
-def _test(point: Point, kind: Crossing) -> float:
-    """Return a test function: for a fold the change of the parameter along the branch, otherwise `crossing_test`."""
-    return float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
+def _test(point: Point, kind: Crossing, sign: float = 1.0) -> float:
+    """Return ``sign`` times a test function: for a fold the parameter's change along the branch, else `crossing_test`."""
+    return sign * float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
+
+
+def _tests(points: Sequence[Point]) -> dict[Crossing, NDArray[np.float64]]:
+    """Return the values of all test functions at the points of a branch: see `_test`."""
+    matrices = np.array([point.data.monodromy for point in points])
+    return {
+        kind: np.array([p.tangent[-1] for p in points]) if kind is Crossing.FOLD else crossing_test(matrices, kind)
+        for kind in Crossing
+    }
+
+
+def _insert_dips(curve: Curve, follower: Follower) -> Curve:
+    """Insert points where a test function passes zero and comes back within one step, as in a narrow unstable window.
+
+    Such a function has one sign at both ends of the step. If its absolute value is convex, it lies above the lines through the
+    two points before and the two points behind; if these lines meet below zero, the function is minimised. The first and the
+    last step have no such lines.
+    """
+    points, steps = [*curve.points], [*curve.steps]
+    if len(steps) < 3:
+        return curve
+    inside, found = np.array(steps[1:-1]), dict[int, tuple[Point, float]]()
+    for kind, tested in _tests(points).items():
+        sign = np.sign(tested[1:-2])
+        first, here, there, last = (sign * tested[k : len(inside) + k] for k in range(4))
+        fall, rise = (here - first) / steps[:-2], (last - there) / steps[2:]
+        # the least value by the lines, times the difference of their slopes
+        least = here * rise - fall * (there - rise * inside)
+        clear = np.min([first, here, there, last], axis=0) > _AT_CROSSING
+        for i in (np.flatnonzero(clear & (fall < 0.0) & (rise > 0.0) & (least < 0.0)) + 1).tolist():
+            test = partial(_test, kind=kind, sign=float(sign[i - 1]))
+            with suppress(ContinuationError):
+                dip, s, value = follower.minimise(points[i], steps[i], points[i + 1], test, -_AT_CROSSING)
+                if value < -_AT_CROSSING:
+                    found[i] = dip, s
+    for i in sorted(found, reverse=True):
+        dip, s = found[i]
+        steps[i : i + 1] = [s, follower.step_length(dip, points[i + 1])]
+        points.insert(i + 1, dip)
+    return replace(curve, points=tuple(points), steps=tuple(steps))
 
 
 def _crossings(before: Point, after: Point, changed: set[Crossing]) -> Iterator[tuple[Crossing, Crossing]]:
@@ -511,9 +553,9 @@ def _special_points(
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     problems: list[str] = []
-    values = [{kind: _test(point, kind) for kind in Crossing} for point in curve.points]
+    values = _tests(curve.points)
     for i, (before, after, length) in enumerate(zip(curve.points, curve.points[1:], curve.steps)):
-        changed = {kind for kind in Crossing if values[i][kind] * values[i + 1][kind] < 0.0}
+        changed = {kind for kind, tested in values.items() if tested[i] * tested[i + 1] < 0.0}
         for kind, tested in _crossings(before, after, changed):
             try:
                 point, s = follower.locate(before, length, after, partial(_test, kind=tested))
