@@ -94,7 +94,8 @@ def resonance(
     maxima, folds, branch points, period doublings, the speeds to avoid, and the classical approximations next to the true
     motion.
 
-    An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed".
+    An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed". If a branch
+    is not followed to an end of the range, or a doubled one is not found, notes say so, and the exit code is 3.
 
     \b
     Examples:

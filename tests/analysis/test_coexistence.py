@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from analysis import Inputs, simulate
 from analysis.cli import main
 from analysis.figures import plot
+from analysis.numerics.continuation import ContinuationError
 from analysis.periodic import (
     Basins,
     Coexistence,
@@ -244,6 +245,26 @@ def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_t
         with_isolas(response, turns=0)
 
 
+@pytest.mark.slow
+def test_a_doubled_branch_is_not_followed_again_from_a_motion_found_far_along_it() -> None:
+    """At 1920 rpm the motion of four turns, which doubles its period at 1998.63 rpm, has a multiplier between 4 and 100."""
+    low, high = 1700.0 * RAD_S_PER_RPM, 2140.0 * RAD_S_PER_RPM
+    whole = with_isolas(frequency_response(LIGHT, low, high, doublings=2), places=1, turns=4)
+    doublings = [special.parameter for branch in whole.branches if branch.turns == 4 for special in branch.special]
+    assert [f"{value / RAD_S_PER_RPM:.1f}" for value in doublings].count("1998.6") == 1
+
+
+def test_doublings_without_a_branch_are_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def find_none(*_: Any, **__: Any) -> None:
+        raise ContinuationError("none")
+
+    monkeypatch.setattr(import_module("analysis.periodic.response.frequency"), "switch", find_none)
+    response = frequency_response(LIGHT, 1800.0 * RAD_S_PER_RPM, 2200.0 * RAD_S_PER_RPM, greatest_step=2e-2)
+    (sentence,) = response.problems
+    assert [place for place in ("1903.88 rpm", "2139.15 rpm") if place in sentence] == ["1903.88 rpm", "2139.15 rpm"]
+
+
+@pytest.mark.slow
 def test_an_isola_is_found_that_the_branch_from_the_ends_does_not_pass() -> None:
     """Rig 2 with spring C and 1 N.s/m: some 20 cm beside a motion of a few, at no speed connected with it."""
     rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=1.0)

@@ -156,9 +156,9 @@ def natural_frequency(parameters: Parameters) -> float:
     return sqrt(spring / mean_effective_mass(parameters))
 
 
-#: A branch of at least four times the period ends when its largest multiplier passes this value. By then there was another
-#: period doubling or a fold, and a machine has changed to another motion.
-STRAYED = 4.0
+#: Largest multiplier up to which a motion of several turns is followed, unless its branch begins at a motion of one turn. By
+#: then there was another period doubling or a fold, and a machine has changed to another motion.
+GREATEST_OF_SEVERAL = 100.0
 
 
 #: Warning about ranges to avoid if no motions off the branches were sought.
@@ -299,7 +299,7 @@ def frequency_response(
     doublings : int
         Number of successive doublings of the period: 1 for the motions of twice the period from each period doubling, 2 for
         the motions of four times the period as well, and so on. Branches of four times the period and more end when their
-        largest multiplier passes `STRAYED`.
+        largest multiplier passes `GREATEST_OF_SEVERAL`.
     most_points : int
         Greatest number of points of a branch.
     greatest_step : float
@@ -425,8 +425,8 @@ class _Search:
                 for turns, value, y in ends
             )
 
-        doubled = self.branches
-        for largest in (GREATEST_MULTIPLIER, *[STRAYED] * (times - 1))[:times]:
+        doubled, without = self.branches, list[str]()
+        for largest in (GREATEST_MULTIPLIER, *[GREATEST_OF_SEVERAL] * (times - 1))[:times]:
             points = [(b.family, s) for b in doubled for s in b.special if s.kind is motion.Crossing.PERIOD_DOUBLING]
             doubled = []
             for family, special in points:
@@ -442,16 +442,22 @@ class _Search:
                         largest=largest,
                         stop=lambda _: self.stop(),
                     )
-                except (motion.OrbitError, ContinuationError) as error:
+                except motion.OrbitError as error:
                     place = self.family.format_value(special.parameter)
                     self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
+                    continue
+                except ContinuationError:
+                    without.append(self.family.format_value(special.parameter))
                     continue
                 self._keep(branch, largest)
                 doubled.append(branch)
                 ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
                 if self.stop():
-                    return
-            self.follow_branch_points(doubled)
+                    break
+            else:
+                self.follow_branch_points(doubled)
+        if without:
+            self.problems.append(f"no motion of twice the period was found near {', '.join(without)}")
 
     def follow_branch_points(self, branches: list[Branch]) -> None:
         """Follow the branches that cross ``branches`` where a motion is stable, and those that cross these; add them to it."""
@@ -561,8 +567,6 @@ def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
 #: Distance of two values of the parameter, relative to the range, at which branches pass one special point; its square root is
 #: that of their motions, relative to the scale.
 _SAME_POINT = 1e-6
-#: Largest multiplier up to which a motion of several turns is followed.
-GREATEST_OF_SEVERAL = 100.0
 
 
 def with_isolas(
