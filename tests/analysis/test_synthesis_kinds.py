@@ -358,7 +358,11 @@ WAY = syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3)
         (None, {"kinds": ("slider-crank",), "bounds": {"ground_length": (-0.04, 0.01)}}, "offset of a slider-crank"),
         (None, {"kinds": ("slider-crank",), "bounds": [0.1]}, "must be a mapping"),
         (None, {"kinds": ("six-bar",)}, "six-bar"),
-        (None, {"kinds": "slider-crank"}, "must be a sequence"),
+        (None, {"kinds": "slider-crank", "gears": (2.0,)}, "kinds are 'slider-crank': they must be a sequence"),
+        (None, {"kinds": 4}, "must be a sequence"),
+        (None, {"kinds": (), "gears": (2.0,)}, "no kind of linkages is given: there are four-bar"),
+        (None, {"kinds": ("slider-krank",), "gears": (2.0,)}, "did you mean slider-crank?"),
+        (None, {"kinds": ("geared-five-bar",), "gears": 2.0}, "gears are 2.0: they must be a sequence"),
         (None, {"kinds": ("geared-five-bar",), "gears": (1.234,)}, "be a ratio of whole numbers"),
         (None, {"gears": (2.0,)}, "gears has no effect"),
         (None, {"bounds": {"second_crank_length": (0.1, 0.2)}}, "second_crank_length has no effect"),
@@ -371,6 +375,8 @@ WAY = syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3)
         (syn.SliderFunction(position=[0.0, 0.1, 0.2]), {"constraints": syn.FullTurn()}, "must be a sequence"),
         (None, {"pivot": "slider"}, "pivot is 'slider'"),
         (None, {"guesses": ["best"]}, "guess 0 is 'best'"),
+        (None, {"guesses": syn.Solution.from_linkage(WAY, SLIDER)}, "guesses are <Solution"),
+        (None, {"guesses": iter(())}, "must be a sequence"),
     ],
 )
 def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], message: str) -> None:
@@ -382,6 +388,8 @@ def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], messa
 def test_what_is_exact_has_no_error_to_trade() -> None:
     with pytest.raises(InputError, match="over has no effect"):
         syn.trade_off(syn.QuickReturn(stroke=0.1), "size", [0.2, 0.3])
+    with pytest.raises(InputError, match="constraints are FullTurn"):
+        syn.trade_off(WAY, "size", [0.2, 0.3], constraints=syn.FullTurn())
 
 
 def moves(linkage: syn.Linkage, name: str) -> float:

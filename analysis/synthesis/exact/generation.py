@@ -480,7 +480,7 @@ def quick_returns(
     Raises InputError or ParameterError if a bound or a constraint is not supported here; InfeasibleError if there is no
     linkage, or no linkage has the required transmission angle: the message names the greatest possible angle.
     """
-    check_sequence(constraints)
+    check_sequence("constraints", constraints)
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
             other = "SliderFunction" if isinstance(task, QuickReturn) else "RockerFunction"

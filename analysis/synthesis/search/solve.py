@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import degrees, isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ...display import NotebookResult, format_count
-from ...files import write_csv
+from ...files import unknown_name, write_csv
 from ...units import Amount, in_si
 from ..exact.burmester import guidance
 from ..exact.generation import QuickReturn, QuickSwing, function_generators, quick_returns
@@ -37,6 +37,7 @@ from ..task.limits import (
     Limits,
     PivotUnknown,
     check_bounds,
+    check_sequence,
     check_task,
     limits_by_kind,
     make_limits,
@@ -270,9 +271,17 @@ def check_arguments(
 ) -> None:
     """Check arguments of `synthesize` and `trade_off`.
 
-    Raises InputError if a pivot or a guess is of another type, or if an argument has no effect on the task with these kinds.
+    Raises InputError if an argument is of another type, a kind is unknown, or an argument has no effect on the task with these
+    kinds.
     """
     kinds, named = usual_kinds(task) if kinds is None else kinds, check_bounds(bounds)
+    for name, values in (("kinds", kinds), ("guesses", guesses), ("gears", gears)):
+        check_sequence(name, values)
+    if not len(kinds):
+        raise InputError(f"no kind of linkages is given: there are {', '.join(get_args(Kind))}")
+    for kind in kinds:
+        if kind not in get_args(Kind):
+            raise unknown_name(kind, get_args(Kind), f"kind {kind!r}")
     if not isinstance(pivot, PivotUnknown | None):
         raise InputError(f"pivot is {pivot!r}: it must be a SliderUnknown or a CrankUnknown")
     for number, guess in enumerate(guesses):
@@ -588,6 +597,7 @@ def trade_off(
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
     check_arguments(task, kinds, bounds=bounds, gears=gears, over=over)
+    check_sequence("constraints", constraints)
     values = np.array(limits, dtype=float)
     kind = {"size": LargestLink, "transmission": LeastTransmission, "pin-force": MaxPinForce}[over]
     running = next((c for c in constraints if isinstance(c, MaxPinForce)), MaxPinForce(force=1.0))

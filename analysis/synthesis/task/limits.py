@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -218,7 +218,7 @@ def make_limits(
     the wrong order, or bounds and constraints contradict one another.
     """
     bounds = check_bounds(bounds)
-    check_sequence(constraints)
+    check_sequence("constraints", constraints)
     # kinds of linkages without a second crank leave it out
     bounds = {name: ends for name, ends in bounds.items() if name != SECOND_LENGTH}
     for name in bounds:
@@ -356,10 +356,10 @@ def check_bounds(bounds: Mapping[str, tuple[float, float]] | None) -> Mapping[st
     return bounds or {}
 
 
-def check_sequence(constraints: Sequence[Any]) -> None:
-    """Raise InputError if constraints are no sequence."""
-    if not isinstance(constraints, Sequence):
-        raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
+def check_sequence(name: str, values: Any) -> None:
+    """Raise InputError if an argument is no sequence, such as a single constraint or a text."""
+    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray):
+        raise InputError(f"{name} are {values!r:.200}: they must be a sequence, even of one")
 
 
 def check_greatest_length(name: str, high: float) -> None:
@@ -448,19 +448,13 @@ def limits_by_kind(
 
     By default the kinds are those of `usual_kinds`.
 
-    Raises InputError if a kind is unknown, cannot do the task, or does not support a constraint; ParameterError,
-    InfeasibleError as `make_limits` does.
+    Raises InputError if a kind cannot do the task or does not support a constraint; ParameterError, InfeasibleError as
+    `make_limits` does.
     """
     kinds, bounds = usual_kinds(task) if kinds is None else kinds, check_bounds(bounds)
-    check_sequence(constraints)
-    if isinstance(kinds, str) or not kinds:
-        raise InputError(
-            f"kinds are {kinds!r}: they must be a sequence of one or several of {', '.join(get_args(Kind))}"
-        )
+    check_sequence("constraints", constraints)
     found: list[Limits] = []
     for kind in kinds:
-        if kind not in get_args(Kind):
-            raise unknown_name(kind, get_args(Kind), f"kind {kind!r}")
         check_task(kind, task)
         _check_constraints(kind, constraints)
         if kind == "four-bar":
@@ -468,7 +462,7 @@ def limits_by_kind(
         elif kind == "slider-crank":
             found.append(_slider_crank_limits(task, normal, bounds, constraints))
         else:
-            if not gears:
+            if not len(gears):
                 raise InputError("no gear ratio is given: geared five-bars need at least one")
             found += _five_bar_limits(task, normal, bounds, constraints, gears)
     return found
