@@ -16,7 +16,7 @@ from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
-from .tables import NO_UNIT, heading_unit, units_below
+from .tables import NO_UNIT, SEPARATOR_LINE, heading_unit, units_below
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
@@ -116,6 +116,8 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
         if ";" in line or "\t" in line.strip():
             line = _DECIMAL_COMMA.sub(".", line)
         cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
+        if number == 1 and SEPARATOR_LINE.match(line):
+            continue
         if cells == [""] or line.lstrip().startswith("#"):
             comment = line if not rows and line.strip() else comment
             continue

@@ -137,7 +137,7 @@ def read_record(
     path = Path(path)
     text = read_text(path).splitlines()
     lines = [(i, line) for i, line in enumerate(text, 1) if line.partition("#")[0].strip()]
-    if lines and lines[0][1].startswith("sep="):  # a line that Excel writes
+    if lines and SEPARATOR_LINE.match(lines[0][1]):
         del lines[0]
     # a comment above the numbers, as NumPy writes headings
     comment = text[lines[0][0] - 2].lstrip("# ") if lines and lines[0][0] > 1 else ""
@@ -189,6 +189,8 @@ def read_record(
     return [units[place] if place < len(units) else "" for place in places], list(columns)
 
 
+#: Line that tells Excel which mark is between the cells.
+SEPARATOR_LINE = re.compile(r"\"?sep=", re.IGNORECASE)
 #: A cell that cannot be a unit below a heading.
 NO_UNIT = re.compile(r"[\s\[(]*[-+.,]*(?:\d|(?:nan|inf|infinity)\s*$)", re.IGNORECASE)
 
@@ -198,7 +200,7 @@ def units_below(units: Sequence[str], cells: Sequence[str], line: int, path: Pat
 
     Raises InputError if the two differ.
     """
-    below = [cell.strip().strip("[]()- ") for cell in cells]
+    below = [cell.strip().strip('"[]()- ') for cell in cells]
     for one, other in zip(units, below):
         if one and other and one != other:
             raise InputError(f"{path}, line {line}: the unit {other!r} is below a heading with the unit {one!r}")

@@ -393,6 +393,7 @@ def test_csv_and_arrays_are_read_back(tmp_path):
         ("\ufeff t ; x ;\n [ms] ; (mm) ;\n\n 0 ; 1,5 ;\n 2 ; 3 ;\n", ["ms", "mm"], [[0.0, 2.0], [1.5, 3.0]]),
         ("t [ms],x\n-,mm\n0,1\n2,3\n", ["ms", "mm"], [[0.0, 2.0], [1.0, 3.0]]),
         ("sep=;\nt [s];x\n0,5;1\n2;3\n", ["s", ""], [[0.5, 2.0], [1.0, 3.0]]),
+        ('"SEP=,"\n"t","x"\n"ms","mm"\n0,1\n2,3\n', ["ms", "mm"], [[0.0, 2.0], [1.0, 3.0]]),
     ],
 )
 def test_columns_of_tables_as_people_write_them(tmp_path, text, units, columns):

@@ -343,6 +343,7 @@ def save(folder: Path, name: str, text: str) -> Path:
         "0,0\t0\n1,0\t0,0\n1.0,\t2.5\n",
         "x;y\nmm;mm\n0,0;0\n1,0;0,0\n1;2,5\n",
         "x [mm], y\n[mm], [mm]\n0,0\n1,0\n1,2.5\n",
+        'sep=;\n"x";"y"\n"mm";"mm"\n0;0\n1;0\n1;2,5\n',
     ],
 )
 def test_points_from_csv(tmp_path: Path, text: str) -> None:
