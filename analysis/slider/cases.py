@@ -178,12 +178,12 @@ class SliderCase:
             raise ParameterError(
                 f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
             )
-        # a search of the simplest mechanism has its own numbers of harmonics and starts
+        # a search for the simplest mechanism has its own numbers of harmonics and starts
         given = asdict(self.slider).items() - asdict(SliderTable()).items() if self.strategy is not None else ()
         for name, value in sorted(given):
             if name not in ("stroke", "links"):
                 raise ParameterError(
-                    f"slider.{name}", value, "not come with [strategy], which takes slider.stroke alone"
+                    f"slider.{name}", value, "not come with [strategy], which takes stroke and links alone"
                 )
         if self.drive is None and any((self.load, self.tracking)):
             raise MissingParameterError("drive.speed")

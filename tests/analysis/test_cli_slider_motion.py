@@ -337,7 +337,7 @@ def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -
     assert float(row.split("│")[4]) < 20.1
 
 
-@pytest.mark.parametrize("option", [("--harmonics", 2), ("--objective", "worst")])
+@pytest.mark.parametrize("option", [("--harmonics", 2), ("--harmonics", 3), ("--objective", "worst")])
 def test_options_of_a_motion_are_not_for_the_strategy(linkwork, option) -> None:
     result = linkwork(tables(strategy={"tolerance": "1 mm"}, slider={}), *option)
     assert result.exit_code == cli.WRONG
