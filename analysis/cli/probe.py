@@ -10,8 +10,7 @@ import click
 
 from linkwork.errors import LinkworkError
 
-from ..files import write_tables, write_text
-from ..files.paths import check_ending
+from ..files import check_ending, write_tables, write_text
 from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
 from ..probe import probe as probe_fmu
 from . import common

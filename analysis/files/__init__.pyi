@@ -14,6 +14,7 @@ from .outputs import attribute_files as attribute_files
 from .outputs import output as output
 from .outputs import write_text as write_text
 from .paths import WritingError as WritingError
+from .paths import check_ending as check_ending
 from .paths import check_fmu as check_fmu
 from .paths import find_problems as find_problems
 from .paths import first_line as first_line
