@@ -19,7 +19,13 @@ from analysis.periodic import (
     frequency_response,
     normal_form,
     special_gradient,
+    steady_drive,
 )
+from analysis.periodic.motion.discretisation import operating_point
+from analysis.periodic.motion.drive import start_ranges
+from analysis.periodic.motion.flow import VARIATIONAL
+from analysis.periodic.motion.kernels import Status, segments
+from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
 from analysis.run.case_files import Case
 from analysis.tuning import Wish, tune
@@ -226,3 +232,50 @@ def test_a_drum_behind_a_gear_and_elastic_shafts_has_its_resonance() -> None:
     assert drum.parameter == pytest.approx(speeds[swing.argmax()], rel=1e-4)
     assert drum.amplitude == pytest.approx(swing.max(), rel=1e-3)
     assert {avoided.risk for avoided in response.speeds_to_avoid} == {Risk.RESONANCE}
+
+
+#: A four-bar whose shaft twists, whose coupler bends and whose rocker stretches.
+ELASTIC = """
+[linkage]
+name = "elastic-four-bar"
+[linkage.ground]
+A = [0, 0]
+G = [0, 0]
+D = ["150 mm", 0]
+[linkage.bodies]
+wheel = { points = { G = [0, 0] }, mass = "2 kg", inertia = "50 kg*cm^2" }
+crank = { bar = ["A", "B"], length = "50 mm", mass = "0.04 kg", inertia = "0.08 kg*cm^2" }
+first = { bar = ["B", "M"], length = "75 mm", mass = "0.06 kg", inertia = "0.3 kg*cm^2" }
+second = { bar = ["M", "C"], length = "75 mm", mass = "0.06 kg", inertia = "0.3 kg*cm^2" }
+rocker = { bar = ["D", "E"], length = "60 mm", mass = "0.05 kg", inertia = "0.2 kg*cm^2" }
+tip = { points = { C = [0, 0] }, mass = "0.1 kg", inertia = "1 kg*cm^2" }
+[linkage.slides]
+S = { body = "tip", on = "rocker", through = "D", direction = "0 deg" }
+[linkage.springs]
+shaft = { bodies = ["wheel", "crank"], stiffness = "300 N*m/rad", damping = "0.3 N*m*s/rad" }
+bend = { at = "M", stiffness = "400 N*m/rad", damping = "0.3 N*m*s/rad" }
+stretch = { at = "S", stiffness = "500 N/mm", free = "120 mm", damping = "60 N*s/m" }
+[linkage.freedoms]
+wheel = { joint = "G", speed = "300 rpm" }
+crank = { joint = "A", start = 0 }
+bend = { joint = "M", start = 0 }
+stretch = { joint = "S", start = "120 mm" }
+[linkage.assembly]
+C = 1
+"""
+
+
+def test_starts_of_elastic_bodies_that_would_take_for_ever(tmp_path: Path) -> None:
+    """A stretch through zero takes steps without end, and a shaft that is wound up turns hundreds of times in a turn."""
+    path = tmp_path / "elastic.toml"
+    path.write_text(ELASTIC, encoding="utf-8")
+    case = load_case(path)
+    drive = steady_drive(case.parameters, case.inputs, case.initial)
+    point = operating_point(case.parameters, drive)
+    ranges = start_ranges(case.parameters, drive, first_guess(point.flow, drive, None))
+    assert max(abs(bound[0]) for bound in ranges) < pi
+    start = np.array([-0.338402922, 1.42102287, -0.0118267618, 29.7565734, -58.3057234, 0.498258135])
+    rows = np.empty((1, 42))
+    status = segments(point.section(start, VARIATIONAL, tolerance=1e-6), np.array([0.0, 0.2]), start[None], rows)
+    assert status == Status.NO_STEP
+    assert find_orbit(case.parameters, case.inputs).verdict().stability is Stability.STABLE

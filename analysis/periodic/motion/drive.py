@@ -586,7 +586,8 @@ SAME = 1e-6
 _WIDEST, _WIDER = 16.0, 1.25
 #: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor above.
 _ONE_SIDED = 1.3
-#: Greatest free vibrations per turn of the crank at the widest starts, unless those of small amplitudes are half as fast.
+#: Greatest free vibrations per turn of the crank at the widest starts, unless those of small amplitudes are half as fast; for a
+#: coupled body, also the greatest speed that the spring of its coupling gives it, relative to the crank.
 _FASTEST = 30.0
 #: Ratio of the largest ellipse of starts to the smallest, for motions much smaller than the room that the links have.
 _DEPTH = 1024.0
@@ -657,7 +658,8 @@ def start_ranges(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the bounds of `assembly_ranges`, reduced to where free vibrations are not too fast: see `_FASTEST`.
 
-    Under a spring that becomes much stiffer there are no periodic motions far away, and integrations from there take very long.
+    Under a spring that becomes much stiffer there are no periodic motions far away, and integrations from there take very long,
+    as they do where the spring of a coupling is wound up so far that it turns the body beyond it many times per turn.
     """
     mechanism, p = find_mechanism(parameters), parameters.constants()
     flow, vector, constants = drive.flow(mechanism), drive.vector(mechanism), np.array(p)
@@ -674,12 +676,16 @@ def start_ranges(
         return float(abs((slopes[1] - slopes[0]) / (away * pace)))
 
     low, high = assembly_ranges(parameters, drive, guess)
+    coupled = {n for n, ratio in drive.ratios_by_freedom(mechanism).items() if ratio}
     for bound in (low, high):
         for i, away in enumerate((bound - flow.rest[:half]).tolist()):
             most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
             # a bound may lie a step beyond the limit of assembly, where there are no accelerations
             inside = away if isfinite(square(i, away)) else away / _WIDER
-            while square(i, inside) > most and abs(inside) > 1e-3 * abs(away):
+            while abs(inside) > 1e-3 * abs(away) and (
+                (vibrations := square(i, inside)) > most
+                or (flow.free[i] in coupled and vibrations * inside**2 > _FASTEST**2)
+            ):
                 inside /= _WIDER
                 bound[i] = flow.rest[i] + inside
     return low, high

@@ -56,12 +56,13 @@ DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
 #: Message for each status that is a failure.
 REASONS = {
     Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
-    Status.NO_STEP: "the integrator cannot meet its tolerance",
+    Status.NO_STEP: "the integrator cannot meet its tolerance, or only by more than 50000 steps per turn",
     Status.STALLED: "the crank comes to rest within the period",
     Status.DIVERGED: "Newton's method does not converge",
 }
-#: Least step of the integrator (rad).
-LEAST_STEP = 1e-12
+#: Least step of the integrator (rad), and the greatest number of steps per turn of the crank, without which a start near a
+#: singular position, such as a slide at the pin of its guide, would take for ever.
+LEAST_STEP, MOST_STEPS = 1e-12, 50000
 #: Greatest error of the columns of derivatives, relative to the tolerance, in a step across a kink.
 _KINK = 1e6
 #: Crank speed below which the crank counts as stalled, relative to its speed at the start.
@@ -148,6 +149,12 @@ def passes_kink(section, error, h, z, y, k, sizes, tolerance, lane, lanes):
 
 
 @inner
+def most_steps(way):
+    """Return the greatest number of steps over a crank angle (rad), which is that of a turn for less than a turn."""
+    return MOST_STEPS * max(1.0, way / (2.0 * np.pi))
+
+
+@inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
     """Take one step from z, shortened until its error is accepted; return the status and the new crank angle.
 
@@ -209,7 +216,10 @@ def advance(section, begin, end, z, room, carry):
     equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
     angle = begin
     status, slowest = _enter(section, equation, angle, z, room)
+    most = carry[1] + most_steps(end - begin)
     while status == DONE and angle < end:
+        if carry[1] > most:
+            return NO_STEP
         status, angle = _take(section, equation, angle, end, slowest, z, room, carry)
         if status == DONE:
             copy(room.y, z)

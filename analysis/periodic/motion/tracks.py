@@ -20,7 +20,18 @@ from ...run.compiled import write_lane
 from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
-from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, passes_kink, start_piece, write_mechanism
+from .kernels import (
+    DONE,
+    LEAST_STEP,
+    LIMIT,
+    NO_STEP,
+    STALL,
+    STALLED,
+    most_steps,
+    passes_kink,
+    start_piece,
+    write_mechanism,
+)
 
 #: Status of a lane whose motion has not ended, and of a lane without a motion; a motion ends with a `Status`.
 RUNNING, IDLE = -1, -2
@@ -47,6 +58,7 @@ class Tracks(NamedTuple):
     h: NDArray[np.float64]  # step (rad)
     step: NDArray[np.float64]  # proposed next step (rad)
     tolerance: NDArray[np.float64]  # bound of the error
+    count: NDArray[np.float64]  # steps since the beginning of the motion
     slowest: NDArray[np.float64]  # crank speed below which the crank counts as stalled (rad/s)
     gap: NDArray[np.float64]  # clearance to the limit of assembly at the end of a step
     before: NDArray[np.float64]  # the same at its beginning
@@ -64,8 +76,8 @@ def make_tracks(section, columns):
         np.zeros(lanes), np.zeros(lanes), np.zeros((n + 1) * LANES), np.zeros(n * (1 + n) * LANES), np.zeros((STAGES, lanes)),
         np.zeros(lanes), np.zeros(section.modes.shape[0] * LANES), np.zeros(section.drive.shape[0] * LANES),
         np.zeros(section.p.shape[0] * LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES),
-        np.zeros(LANES), np.ones(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE),
-        np.zeros(width),
+        np.zeros(LANES), np.ones(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES),
+        np.full(LANES, IDLE), np.zeros(width),
     )  # fmt: skip
 
 
@@ -90,7 +102,7 @@ def begin(lane, section, start, end, tolerance, v):
     n = start.shape[0]
     start_piece(n, start, v.z)
     write_lane(lane, LANES, v.z, v.x)
-    v.angle[lane], v.end[lane], v.tolerance[lane] = 0.0, end, tolerance
+    v.angle[lane], v.end[lane], v.tolerance[lane], v.count[lane] = 0.0, end, tolerance, 0.0
     v.slowest[lane] = STALL * start[n - 1] if section.torque else 0.0
     evaluate(section.equations[GAP], 0.0, v.z, section.modes, section.drive, section.p, v.out)
     v.before[lane] = v.out[0]
@@ -147,6 +159,10 @@ def _judge(lane, section, last, v):
     """
     h, n = v.h[lane], section.scale.shape[0]
     error = v.error[lane] / v.tolerance[lane]
+    v.count[lane] += 1.0
+    if v.count[lane] > most_steps(v.end[lane]):
+        v.status[lane] = NO_STEP
+        return True
     if not error <= 1.0:
         # beyond the limit of assembly the error is NaN
         v.step[lane] = shorter_step_size(h, error)
