@@ -316,7 +316,7 @@ def _momentum_rates() -> tuple[Statement, ...]:
             text("section 2.8, eqs 57, 58, L848-857"),
             "difference of eqs 57 and 58 from the rates of eqs 52a (erratum 9 mended) and 53a, in a general position "
             f"{AT_RATES} and g3 = {G3:g} in. Then the greatest difference of the force parts of 57 from 55 and of 58 from "
-            f"56, at the angles at which the row on the two paths compares the momenta; {DOTS}",
+            f"56, at the angles at which the row at L637 compares the momenta; {DOTS}",
             ROUNDING,
             (*(nothing(label, difference(found, _rate(h)), "lb") for label, found, h in backward), *replacements()),
             PATHS,

@@ -184,7 +184,8 @@ def _derivatives() -> tuple[Statement, ...]:
         Statement(
             "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
             text("section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of"),
-            "S1' by eq 28a minus the rate of eq 28, at theta1 = 0.9 rad with alpha = 2 and an amplitude of 2 in",
+            "S1' by eq 28a minus the rate of eq 28, at theta1 = 0.9 rad with alpha = 2, an amplitude of 2 in and the "
+            "50 rpm of L1075",
             ROUNDING,
             (method.unsure("eq 28a", "S1 for its amplitude S_S1", of_28a, "in/s"),),
         ),

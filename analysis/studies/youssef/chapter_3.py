@@ -458,7 +458,7 @@ def _torque_causes() -> list[Statement]:
             text("3.2.1, L2005-2013"),
             "shares in the difference of the row before: of the inertial loads (all but the weight), and of the slider's "
             "position alone (the mean of its effect when it is changed before its rates and after them). Then the greatest "
-            f"spread of u between the springs, relative to the {to_shaft:.2f} cm from start to shaft",
+            f"spread of u between the springs, relative to the {to_shaft:.2f} cm from start to shaft (our choice)",
             f"{ALIKE:g}, the rule for *the same*, as *only* says; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
             (
                 *(
@@ -498,7 +498,8 @@ def _torque_conclusion() -> Statement:
         text("3.2.1, L2017-2029"),
         "among the crank angles at which the torques of the springs differ, the share at which the slider's accelerations "
         "differ too. For *leading to different inertial loads*: greatest difference of the part of the torque that the "
-        "acceleration causes. All differences are relative to the greatest size of the torque or acceleration",
+        f"acceleration causes. All differences are relative to the greatest size of the torque with {_k(1e6)}, or of the "
+        "acceleration with any of the springs",
         f"all; {ALIKE_WORDS}",
         (
             near("torques differ where accelerations do", 1.0, np.mean(unequal[apart > ALIKE] > ALIKE), 0.0),

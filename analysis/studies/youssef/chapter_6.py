@@ -232,8 +232,9 @@ def _weighted() -> tuple[Statement, ...]:
             "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
             "the expense of the remaining portions of the output.",
             text("6.4.2 B, L4973; also 6.2.2, L4247"),
-            "rms error of the weighted printed linkage within the window, relative to the function's range of 100 deg; its "
-            f"squared errors relative to those of the unweighted linkage, within the window and outside it; {N} crank angles",
+            "rms error of the weighted printed linkage within the window, to which both its ends belong, relative to the "
+            "function's range of 100 deg; its squared errors relative to those of the unweighted linkage, within the window "
+            f"and outside it; {N} crank angles",
             f"{ALIKE:g}, the rule for *the same*, which we use for *closely*; at most 1 within the window, at least 1 "
             "outside it",
             (

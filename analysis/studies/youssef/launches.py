@@ -47,6 +47,10 @@ SLIDER: Quantity = ("slider position u", "slider.position", CM_PER_METRE, "cm")
 CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
 TIME = "time [s]"
 #: Our choices in the launches.
+#: Which turns `damper_cases` compares after a launch.
+FROM_RELEASE = (
+    "in 3 s (our choice) or until the links become collinear. The turns are counted from 1 rad, where the torque ends"
+)
 UNSAID = (
     "The text does not give the damper of the launches, nor how long they are followed, nor the spring of the launches with "
     "three torques. We take the damper of Fig 3.4, 1 s, and the middle spring of Fig 3.4."
@@ -290,7 +294,7 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED} in 3 s (our choice) or until the links become collinear",
+            f"{UNDAMPED} {FROM_RELEASE}",
             LOSS,
             damper_cases(undamped, 1.0),
             undamped_range(undamped, 1.0),
@@ -425,8 +429,8 @@ def launch_speeds_by_spring() -> StudyResult:
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} in 3 s (our "
-            "choice) or until the links become collinear",
+            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} "
+            f"{FROM_RELEASE}",
             LOSS,
             (_swing_cases(_spring_runs(), 1.0)[0], *damper_cases(undamped, 1.0)),
             undamped_range(undamped, 1.0),

@@ -444,10 +444,11 @@ def compute_harmonics() -> StudyResult:
                 "and hence are in agreement with the experiment.",
                 text("8.4.2.2, L6877-6885"),
                 "greatest first harmonic divided by the greatest second harmonic, each at its own speed, by the linear "
-                "equation, corrected. What the experiment showed is judged at L6871",
+                "equation, corrected because the terms of (4.21) for a coupler with mass are illegible in our scan. What the "
+                "experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", _greatest(s, 1) / _greatest(s, 2), ABOUT * 50.0) for s in "CD"),
-                "the equation is corrected because the terms of (4.21) for a coupler with mass are illegible in our scan",
+                "the second harmonic is about 1.5 times as large as a fiftieth of the first",
             ),
         ),
     )
