@@ -236,6 +236,11 @@ class TestFormulation:
         assert run.unseen < 1e-12
         assert run.gap.max() > run.errors[0]
 
+    def test_closure_shows_the_error_of_a_launch_if_the_torque_ends_smoothly(self) -> None:
+        smooth, kinked = (gap / errors[0] for gap, errors in (formulation.integrate_launch(1e-3, n) for n in (5, 1)))
+        assert 1.0 < smooth < 100.0
+        assert kinked < 0.1
+
     def test_estimate_of_hamming_tells_the_truncation_and_no_error_of_the_start(self) -> None:
         estimates, errors, _ = formulation.estimated_errors()
         assert np.corrcoef(estimates, errors)[0, 1] > 0.95
