@@ -18,7 +18,7 @@ from linkwork import integrate as integrator
 from linkwork import limits, plant, tableau
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
-from linkwork.parameters import NOT_NEGATIVE, POSITIVE, fmi_name
+from linkwork.parameters import GREATEST, NOT_NEGATIVE, POSITIVE, TOO_LARGE, TOO_SMALL, fmi_name
 
 from ..numerics import symbolic
 from ..run import equations
@@ -339,6 +339,7 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
         "LIMIT_CLEARANCE": limits.LIMIT_SINE,
         "NEAR_CLEARANCE": limits.NEAR_LIMIT,
         "LEAST_TOLERANCE": plant.TOLERANCE_RANGE[0],
+        "GREATEST": GREATEST,
     }
     return "\n".join(
         [
@@ -350,6 +351,8 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};",
             f"#define TWISTS {len(_twists(mechanism))}",
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
+            f"#define TOO_LARGE {_text(TOO_LARGE)}",
+            f"#define TOO_SMALL {_text(TOO_SMALL)}",
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
             f"#define SLIPPED {_text(limits.SLIPPED)}",

@@ -6,13 +6,14 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
-from math import pi
+from math import nan, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
+from linkwork.integrate import UNDEFINED
 from linkwork.limits import ASSEMBLY, MASSLESS
 from linkwork.mechanism import Mechanism
 
@@ -122,7 +123,11 @@ class Run:
         energy = self.mechanism.equations.energy(state, self.p)
         # only such large values may overflow
         great = not (abs(energy) < _GREAT and max(map(abs, u.tolist()), default=0.0) < _GREAT)
-        if great and not np.isfinite([energy, *self.mechanism.equations.derivative(state, acting, self.p)]).all():
+        try:
+            slope = self.mechanism.equations.derivative(state, acting, self.p) if great else ()
+        except UNDEFINED:
+            slope = (nan,)
+        if not np.isfinite([energy, *slope]).all():
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
             name = max(values, key=lambda name: abs(values[name]))

@@ -11,6 +11,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
 from .errors import JammingError, LinkworkError
+from .integrate import UNDEFINED
 from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT, UnjoinedMessages
 from .parameters import Rules
 from .variables import Variable
@@ -418,8 +419,13 @@ class Mechanism:
             If the links cannot be joined; `JammingError` if friction may jam the links.
         """
         self.check_assembly(x, p)
-        if self.is_switched_on(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
-            raise JammingError(f"{JAMMING} at {self.describe_state(x)}")
+        if self.is_switched_on(p):
+            try:
+                clear = self.equations.clearance(x, i, p) >= LIMIT_SINE
+            except UNDEFINED:
+                clear = False
+            if not clear:
+                raise JammingError(f"{JAMMING} at {self.describe_state(x)}")
 
     @cached_property
     def cyclic_freedoms(self) -> tuple[int, ...]:

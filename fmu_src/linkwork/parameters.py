@@ -16,6 +16,10 @@ from .errors import ParameterError
 
 POSITIVE = "be a finite number greater than zero"
 NOT_NEGATIVE = "be a finite number, zero or greater"
+#: Greatest magnitude of a parameter; its inverse is the least value of a parameter above zero. Their fourth powers are floats.
+GREATEST = 1e75
+TOO_LARGE = f"be small enough to compute with, at most {GREATEST:g} in magnitude"
+TOO_SMALL = f"be large enough to compute with, at least {1.0 / GREATEST:g}"
 
 
 def fmi_name(field_name: str) -> str:
@@ -47,7 +51,9 @@ class LowerBound(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Rules for the values of a mechanism's parameters, which must also be finite: the attribute ``RULES`` of their dataclass.
+    """Rules for the values of a mechanism's parameters: the attribute ``RULES`` of their dataclass.
+
+    All values must also be finite and within the range that `GREATEST` sets.
 
     Attributes
     ----------
@@ -71,8 +77,8 @@ def check_parameters(parameters: Any) -> None:
     Raises
     ------
     ParameterError
-        For the first field that breaks a rule; if none does, but a constant of the equations is not finite, for the field of
-        the most extreme magnitude.
+        For the first field that breaks a rule, or is too large or too small to compute with; if none is, but a constant of
+        the equations is not finite, for the field of the most extreme magnitude.
     """
     rules: Rules = parameters.RULES
     for field in fields(parameters):
@@ -100,6 +106,12 @@ def check_parameters(parameters: Any) -> None:
                 raise ParameterError(name, value, "be a finite number")
         elif not (isfinite(value) and value >= 0.0):
             raise ParameterError(name, value, NOT_NEGATIVE)
+    for field in fields(parameters):
+        value = getattr(parameters, field.name)
+        if abs(value) > GREATEST:
+            raise ParameterError(fmi_name(field.name), value, TOO_LARGE)
+        if field.name in rules.positive and value < 1.0 / GREATEST:
+            raise ParameterError(fmi_name(field.name), value, TOO_SMALL)
     for least in rules.least:
         bound, value = least.of(parameters), getattr(parameters, least.field)
         if value < bound:

@@ -171,7 +171,12 @@ static Reason check_parameters(const Plant *a, char sentence[SENTENCE]) {
     for (int v = 0; v < VARIABLES; v++)
         if (variables[v].causality == PARAMETER && !keeps(&variables[v], a->given[v]))
             return bad_parameter(v, a->given[v], variables[v].requirement, sentence);
-    for (int i = 0; i < PARAMETERS; i++) own[i] = a->given[parameter_at[i]];
+    for (int i = 0; i < PARAMETERS; i++) {
+        int v = parameter_at[i];
+        own[i] = a->given[v];
+        if (fabs(own[i]) > GREATEST) return bad_parameter(v, own[i], TOO_LARGE, sentence);
+        if (variables[v].rule == POSITIVE && own[i] < 1.0 / GREATEST) return bad_parameter(v, own[i], TOO_SMALL, sentence);
+    }
     call(equations_bounds, (const double *[]){own}, (double *[]){bounds});
     for (int i = 0; i < BOUNDS; i++)
         if (own[least[i].parameter] < bounds[i]) {

@@ -588,6 +588,13 @@ def test_a_speed_beyond_all_numbers_is_refused(speed: float, method: str) -> Non
         simulate(TABLE_3_1, Inputs(torque=1e308), stop_time=1.0, method=method)
 
 
+@pytest.mark.parametrize("name", ["coupler_cog_distance", "rocker_cog_distance"])
+def test_parameters_for_which_there_are_no_accelerations_are_refused(name: str) -> None:
+    # the mass matrix of the free crank is singular to rounding
+    with pytest.raises(InputError, match="energy or accelerations at the start are not finite"):
+        simulate(replace(TABLE_3_1, **{name: 1e75}), initial=InitialState(crank_speed=SPEED), stop_time=1e-3)
+
+
 @pytest.mark.parametrize(("mass", "warned"), [(0.59, False), (1e9, True)])
 def test_a_balance_of_energy_worse_than_the_tolerance_promises_is_noted(mass: float, warned: bool) -> None:
     run = simulate(replace(TABLE_3_1, slider_mass=mass), Inputs(speed=SPEED), stop_time=1.0)

@@ -18,6 +18,7 @@ NAN, INF = float("nan"), float("inf")
 #: may not be is in `tests/plant/test_parameters.py`.
 BAD_ANYWHERE = {
     "negative length": ({"crank.length": -0.05}, "parameter crank.length is -0.05: it must be"),
+    "length lost in products": ({"crank.length": 5e-324}, "parameter crank.length is 5e-324: it must be large enough"),
     "branch": ({"assembly.branch": 0}, "parameter assembly.branch is 0: it must be +1 or -1"),
     "drive mode": ({"drive.mode": 7}, "parameter drive.mode is 7: it must be 0 (torque) or 1 (speed)"),
     "tolerance not a number": ({"solver.tolerance": NAN}, "parameter solver.tolerance is nan: it must be between"),

@@ -179,6 +179,9 @@ def test_friction_that_would_jam_the_links_is_refused() -> None:
             inputs={"drive.speed": SPEED},
             drive_mode=1,
         )
+    # a mass matrix that is singular to rounding has no clearance at all
+    with pytest.raises(JammingError):
+        Plant(FIVE_BAR, replace(par, rocker_cog_distance=1e11), InitialState())
 
 
 @both_drives
