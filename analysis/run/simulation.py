@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, ulp
-from numbers import Integral
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
@@ -16,7 +16,14 @@ from linkwork.plant import check_tolerance
 from ..files import limit, unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si, quantity
-from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published, usual_times
+from .arguments import (
+    complete_initial_state,
+    complete_inputs,
+    require_kind,
+    takes_options,
+    takes_published,
+    usual_times,
+)
 from .events import Event
 from .inputs import Inputs
 from .prepared import Run, Settings
@@ -29,6 +36,7 @@ if TYPE_CHECKING:
 MOST_STEPS = 100_000_000
 #: Default of the largest number of samples of a run: a larger one probably comes from a wrong unit and fills the memory.
 _SAMPLES = 20_000_000
+_TIME = "a number of seconds, or a text with its unit"
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -41,8 +49,10 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
     Raises
     ------
     InputError
-        If the step is not positive, or the run does not end after it starts.
+        If a time is not a number, the step is not positive, or the run does not end after it starts.
     """
+    for name, value in (("step", step), ("stop_time", stop_time), ("start_time", start_time)):
+        require_kind(value, Real, name, _TIME)
     if not (isfinite(step) and step > 0.0):
         raise InputError(f"step is {step} s: it must be a finite number greater than zero")
     if not (isfinite(stop_time) and isfinite(start_time) and stop_time > start_time):
@@ -200,6 +210,7 @@ def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: fl
     tolerance = quantity(tolerance, "1", "solver.tolerance")
     check_tolerance(tolerance)
     if hold is not None:
+        require_kind(hold, Real, "hold", _TIME)
         _check_hold(hold, times)
     if isinstance(max_steps, bool) or not isinstance(max_steps, Integral) or max_steps < 1:
         raise ParameterError("max_steps", max_steps, "be a whole number, at least 1")

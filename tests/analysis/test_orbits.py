@@ -250,6 +250,7 @@ def test_a_crank_that_stalls_is_reported() -> None:
         ({}, "neither a speed nor a torque"),
         ({"speed": 1.0, "torque": 1.0}, "both a speed and a torque"),
         ({"speed": -1.0}, "above zero"),
+        ({"speed": []}, "speed is list: give a number"),
         ({"speed": float("nan")}, "above zero"),
         ({"torque": float("inf")}, "torque is inf"),
         ({"torque": 1.0}, "crank speed is needed"),

@@ -254,5 +254,7 @@ def test_bad_sweeps_are_refused(speeds: list[float], message: str) -> None:
 def test_bad_ranges_are_refused() -> None:
     with pytest.raises(InputError, match="finite and increasing"):
         frequency_response(TABLE_3_1, 2.0 * pi, pi)
+    with pytest.raises(ParameterError, match=r"low is \[\]: it must be a number in rad/s"):
+        frequency_response(TABLE_3_1, [], pi)
     with pytest.raises(InputError, match="say what drives the plant"):
         frequency_response(TABLE_3_1, 1.0, 2.0, vary="slider.damping")

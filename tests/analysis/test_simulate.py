@@ -595,6 +595,13 @@ def test_parameters_for_which_there_are_no_accelerations_are_refused(name: str) 
         simulate(replace(TABLE_3_1, **{name: 1e75}), initial=InitialState(crank_speed=SPEED), stop_time=1e-3)
 
 
+@pytest.mark.parametrize("wrong", [[], {}, (1.0,), 1j])
+def test_times_that_are_no_numbers_are_refused_by_name(wrong: Any) -> None:
+    for name in ("stop_time", "step", "start_time", "hold"):
+        with pytest.raises(InputError, match=rf"^{name} is \w+: give a number of seconds"):
+            simulate(TABLE_3_1, Inputs(speed=SPEED), **{"stop_time": 0.1, "step": 1e-3, name: wrong})
+
+
 @pytest.mark.parametrize(("mass", "warned"), [(0.59, False), (1e9, True)])
 def test_a_balance_of_energy_worse_than_the_tolerance_promises_is_noted(mass: float, warned: bool) -> None:
     run = simulate(replace(TABLE_3_1, slider_mass=mass), Inputs(speed=SPEED), stop_time=1.0)

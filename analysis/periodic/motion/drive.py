@@ -7,6 +7,7 @@ from dataclasses import InitVar, dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from math import inf, isfinite, lcm, pi
+from numbers import Real
 from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
@@ -25,6 +26,7 @@ from ...run import (
     check_run,
     complete_initial_state,
     complete_inputs,
+    require_kind,
     speed_ratio,
     start_ratio,
     takes_published,
@@ -110,8 +112,8 @@ class Drive:
     Raises
     ------
     InputError
-        If a value is not finite, the speed is not above zero, there are both a speed and a torque, or speeds have no common
-        period.
+        If a value is not a finite number, the speed is not above zero, there are both a speed and a torque, or speeds have no
+        common period.
     """
 
     speed: Amount = None
@@ -126,6 +128,9 @@ class Drive:
     speeds: InitVar[Mapping[str, Amount] | None] = None
 
     def __post_init__(self, speeds: Mapping[str, Any] | None) -> None:
+        alone = {name: value for name in ("speed", "torque") if (value := getattr(self, name)) is not None}
+        for name, value in {**alone, **self.forces, **self.held, **(speeds or {})}.items():
+            require_kind(value, Real, name, "a number in SI, or a text with its unit")
         if speeds:
             if self.speed is not None:
                 raise InputError("both speed and speeds are given: speeds has those of all commanded cranks")

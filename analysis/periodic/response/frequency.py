@@ -30,7 +30,7 @@ from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
 from ...numerics.workers import record_interrupts
 from ...run import inertia_and_stiffness, require_kind, show_progress, takes_published
-from ...units import Amount, si
+from ...units import Amount, quantity
 from .. import motion
 from ..stability import SpecialPoint
 from .advice import AvoidedRange, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
@@ -331,7 +331,7 @@ def frequency_response(
     mechanism = find_mechanism(parameters)
     vary = vary or motion.default_variable(mechanism, drive)
     unit = motion.parameter_unit(mechanism, vary)
-    low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
+    low, high = quantity(low, unit, "low"), quantity(high, unit, "high")
     if drive is None:
         if vary not in motion.speed_names(mechanism):
             raise InputError(
