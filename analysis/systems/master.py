@@ -402,7 +402,7 @@ def run_system(
         flows={str(bond.effort): passing[:, number] for number, bond in enumerate(bonds)},
         status=status,
         message=message,
-        notes=tuple(wiring.notes()),
+        notes=tuple(wiring.notes(step)),
         title=wiring.title,
         coupling=coupling,
         units={str(end): wiring.unit(end) for end in together.ends},

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from math import isclose
+from math import inf, isclose
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -263,8 +263,13 @@ class Wiring:
         )
         return next((other for other in inputs if self.port(other).unit == unit), None)
 
-    def notes(self) -> list[str]:
-        """Return the remarks and hints at possible mistakes: unconnected inputs, controllers without gains, algebraic loops."""
+    def notes(self, step: float | None = None) -> list[str]:
+        """Return the remarks and hints at possible mistakes.
+
+        These are unconnected inputs, controllers without gains, or sampled more often than there are communication steps of
+        ``step`` seconds (by default those of the system), and algebraic loops.
+        """
+        step = self.step if step is None else step
         found = [*self.remarks]
         for name, part in self.parts.items():
             inputs = part.real_variables("input")
@@ -282,6 +287,13 @@ class Wiring:
             starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
                 found.append(f"{name}: its gains are 0: {', '.join(gains)}")
+            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name == "sample_time"}
+            period = part.values.get("sample_time", starts.get("sample_time", inf))
+            if step > period * (1.0 + 1e-9):
+                found.append(
+                    f"{name}: {step:g} s between communication points are longer than its sample time, {period:g} s: the "
+                    "samples in a step use the same inputs"
+                )
         if loops := sorted(self.loops(), key=len):
             more = f", and {len(loops) - 1} more" if len(loops) > 1 else ""
             shortest = " -> ".join(map(str, loops[0]))

@@ -138,6 +138,14 @@ def test_a_controller_without_gains_is_noted(tmp_path: Path) -> None:
     assert not any("gains" in note for note in wiring_of("slider-tracking").notes())
 
 
+def test_steps_longer_than_a_sample_are_noted() -> None:
+    wiring = wiring_of("slider-tracking")
+    assert not any("sample time" in note for note in [*wiring.notes(), *wiring.notes(0.5e-3)])
+    found = [note.partition(": ") for note in wiring.notes(0.6e-3) if "sample time" in note]
+    assert {name for name, _, _ in found} == {"reference", "controller"}
+    assert all(said.startswith("0.0006 s between communication points are longer") for _, _, said in found)
+
+
 @pytest.mark.parametrize(
     "case",
     [
