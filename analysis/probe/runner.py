@@ -94,9 +94,16 @@ def probe(
     Returns
     -------
     Report
+
+    Raises
+    ------
+    InputError
+        If a check is unknown, or ``seconds`` is not above zero.
     """
     from .checks import CHECKS
 
+    if not seconds > 0.0:
+        raise InputError(f"seconds is {seconds}: no random call would be made; it must be above 0")
     for check in checks:
         if check not in CHECKS:
             raise unknown_name(check, CHECKS, f"check {check!r}")

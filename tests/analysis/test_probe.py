@@ -270,6 +270,8 @@ def test_a_job_that_has_just_ended_may_be_killed():
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        (["--time", "0"], "seconds is 0.0: no random call would be made; it must be above 0"),
+        (["--time", "nan"], "seconds is nan: no random call would be made; it must be above 0"),
         (["--check", "nothing"], "there is no check 'nothing' (the nearest of 14 names are"),
         (["--replay", "0/cs/nothing/1"], "there is no case '0/cs/nothing/1'"),
     ],
