@@ -196,8 +196,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
     """Judge the statements on the regions with a damper, given their charts by omega_c (1/s)."""
     tips = [float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0]
     growth = max(narrowing(charts, ratio) for ratio in (*COMPARED, 2.0))
-    crank, coupler = (0.001, *SWEEPS["5.2"].values), SWEEPS["5.3"].values
-    mechanism = chapter_4(1.5)
+    crank, coupler, mechanism = (0.001, *SWEEPS["5.2"].values), SWEEPS["5.3"].values, chapter_4(1.5)
     fast = crank_speed(0.5 * boundary_stiffnesses(equation(mechanism), 1, count=1)[0].real)
     return (
         Statement(
@@ -245,7 +244,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             (
                 at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
                 at_most(
-                    "Fig 5.3; angles held", "0.45", max(removing_estimate(with_held_angles(x)) for x in coupler), "1/s"
+                    "Fig 5.3; angles held", "0.45", max(map(removing_estimate, map(with_held_angles, coupler))), "1/s"
                 ),
                 at_most(
                     "Fig 5.3; same ground link",
@@ -267,10 +266,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             (
                 at_most("growth of the width", 0.0, growth),
                 at_most("omega_c", STATED, max(removing_estimate(mechanism, n) for n in range(1, 5)), "1/s"),
-                *(
-                    at_most(f"multiplier; {omega_c:g} 1/s", 1.0, multiplier(1.5, omega_c, fast))
-                    for omega_c in (STATED, 1e3 * STATED)
-                ),
+                *(at_most(f"multiplier; {d:g} 1/s", 1.0, multiplier(1.5, d, fast)) for d in (STATED, 1e3 * STATED)),
             ),
             "beyond the zeroth boundary the slider falls away; a damper slows it but does not stop it",
         ),

@@ -211,8 +211,7 @@ def _rocker() -> tuple[Statement, ...]:
     least_read, reading = min(
         (value, name) for each in joined for name, value in errors_by_reading(ROCKER, each).items()
     )
-    kept = linkage_error(ROCKER, p.linkage)
-    raised = linkage_error(ROCKER, best_reading) / kept
+    raised = linkage_error(ROCKER, best_reading) / linkage_error(ROCKER, p.linkage)
     lowered = linkage_error(PATH, mended_path_linkage()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
     two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
     fewer = f"{SEEN_FALL}; an additional freedom cannot raise the least error"
