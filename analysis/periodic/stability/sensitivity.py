@@ -512,7 +512,10 @@ def _locate_motion(
 
 def _extremum_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     (along,) = motion.names
-    size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
+    size, slope = motion.amplitude.value, motion.amplitude[along]
+    if size == 0.0:
+        raise ZeroDivisionError("a coordinate that does not move has no curvature at its extremes")
+    curvature = motion.amplitude_curvature(along)[along]
     # near a resonance 1 / amplitude^2 is nearly a parabola, near a minimum amplitude^2 is nearly one
     peaked = 3.0 * slope**2 - size * curvature
     step = slope * size / (peaked if peaked > 0.0 else -(slope**2) - size * curvature)
