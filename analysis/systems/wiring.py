@@ -284,10 +284,10 @@ class Wiring:
                 if said := ", ".join(f"{port} in {unit}" for port, unit in own.items() if unit):
                     found.append(f"{name}: its FMU gives no units; each is taken from the other end: {said}")
             gains = [own for own in part.real_variables("parameter") if f"_{own}".endswith("_gain")]
-            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
+            asked = {*gains, "sample_time"}
+            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in asked}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
                 found.append(f"{name}: its gains are 0: {', '.join(gains)}")
-            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name == "sample_time"}
             period = part.values.get("sample_time", starts.get("sample_time", inf))
             if step > period * (1.0 + 1e-9):
                 found.append(

@@ -53,16 +53,16 @@ class Status(IntEnum):
 
 # the statuses as plain integers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-#: Message for each status that is a failure.
-REASONS = {
-    Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
-    Status.NO_STEP: "the integrator cannot meet its tolerance, or only by more than 50000 steps per turn",
-    Status.STALLED: "the crank comes to rest within the period",
-    Status.DIVERGED: "Newton's method does not converge",
-}
 #: Least step of the integrator (rad), and the greatest number of steps per turn of the crank, without which a start near a
 #: singular position, such as a slide at the pin of its guide, would take for ever.
 LEAST_STEP, MOST_STEPS = 1e-12, 50000
+#: Message for each status that is a failure.
+REASONS = {
+    Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
+    Status.NO_STEP: f"the integrator cannot meet its tolerance, or only by more than {MOST_STEPS} steps per turn",
+    Status.STALLED: "the crank comes to rest within the period",
+    Status.DIVERGED: "Newton's method does not converge",
+}
 #: Greatest error of the columns of derivatives, relative to the tolerance, in a step across a kink.
 _KINK = 1e6
 #: Crank speed below which the crank counts as stalled, relative to its speed at the start.
