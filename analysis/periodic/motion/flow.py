@@ -568,7 +568,7 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
         The crossing; the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function is
         det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
         negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of
-        (mu_i mu_j - 1) over all pairs of multipliers mu_i, mu_j.
+        (mu_i mu_j - 1) over all pairs of multipliers mu_i, mu_j; it is 1 if there is a single multiplier.
 
     Returns
     -------
@@ -576,8 +576,8 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     """
     if crossing is Crossing.TORUS:
         mu = multipliers(monodromy)
-        pairs = [mu[..., i] * mu[..., j] - 1.0 for i in range(mu.shape[-1]) for j in range(i)]
-        return np.asarray(np.prod(pairs, axis=0).real)
+        i, j = np.tril_indices(mu.shape[-1], -1)
+        return np.asarray(np.prod(mu[..., i] * mu[..., j] - 1.0, axis=-1).real)
     multiplier = crossing.sign if isinstance(crossing, Crossing) else crossing
     require_sign(multiplier)
     if monodromy.shape[-1] != 2:
