@@ -7,11 +7,16 @@ both at the drawn state and where the groove puts the crank.
 
 from collections.abc import Callable
 from math import cos, hypot, pi, sin, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import Constants, InitialState, SliderCrankParameters
 from tests.strategies import Uniform, suppliers
+
+if TYPE_CHECKING:
+    from analysis.slider_crank import JointLoads
 
 #: Drives of crank and shift by name, as the values speed_drive, shift_drive, groove of `dynamics.Inputs`.
 DRIVES = {
@@ -131,3 +136,17 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
 
 
 seeded, cases, mechanisms = suppliers(draw)
+
+
+def components(loads: "JointLoads", name: str, frame: int) -> Any:
+    """Return the components of a force or moment by dual vectors in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide), (n, 3).
+
+    In frame 3 the axis i is along the rod, j perpendicular to rod and crank axis.
+    """
+    closure, vector = loads.closure, getattr(loads, name)
+    i = closure.rod_frame.real[..., 0]
+    j = np.cross([0.0, 0.0, 1.0], i)
+    j /= np.linalg.norm(j, axis=-1, keepdims=True)
+    rod = np.stack([i, j, np.cross(i, j)], -1)
+    axes = {1: np.eye(3)[None], 2: closure.crank_frame.real, 3: rod, 4: closure.guide_frame.real}
+    return np.einsum("nji,nj->ni", np.broadcast_to(axes[frame], rod.shape), vector)

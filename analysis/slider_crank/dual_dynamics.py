@@ -15,7 +15,6 @@ The plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`) are not u
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -27,7 +26,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, close, scale
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
-from .quantities import DEAD_CENTRE, JOINTS, FloatArray, array_per_angle, check_joint
+from .quantities import DEAD_CENTRE, JOINTS, FloatArray, array_per_angle
 from .shifts import has_shaft_groove, plant_functions
 
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
@@ -35,14 +34,7 @@ LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
-    """Error at a dead centre, dS4/dtheta1 = 0, where the crank torque does not determine the slider force.
-
-    ``points`` are the indices of the dead centres among the points.
-    """
-
-    def __init__(self, message: str, points: tuple[int, ...]) -> None:
-        super().__init__(message)
-        self.points = points
+    """Error at a dead centre, dS4/dtheta1 = 0, where the crank torque does not determine the slider force."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,26 +103,6 @@ class JointLoads:
     guide: FloatArray
     guide_moment: FloatArray
     residual: FloatArray
-
-    def components(self, name: str, frame: int) -> FloatArray:
-        """Return the components of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide), shape (n, 3).
-
-        The points about which moments are taken do not change with the frame.
-
-        Parameters
-        ----------
-        name : str
-            One of `JOINTS`.
-        frame : int
-
-        Raises
-        ------
-        InputError
-            If there is no such force, moment or frame, or if frame 3 is not determined: its axis j is perpendicular to the rod
-            and the crank axis, which must not be parallel.
-        """
-        check_joint(name, frame)
-        return cast(FloatArray, np.einsum("nji,nj->ni", _FRAMES[frame](self.closure), getattr(self, name)))
 
 
 def rates(
@@ -315,7 +287,7 @@ def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArr
     frames = (closure.crank_frame, closure.rod_frame, closure.guide_frame)
     gravity = Dual(np.zeros(3), np.array([p.gravity_x, p.gravity_y, p.gravity_z]))
     needed = [
-        binor.rate(apply(body.T, velocity), apply(body.T, rate)) - binor.momentum(apply(_axes(body).T, gravity))
+        binor.rate(apply(body.T, velocity), apply(body.T, rate)) - binor.momentum(apply(Dual(body.real).T, gravity))
         for binor, body, velocity, rate in zip(
             binors(p),
             frames,
@@ -344,36 +316,8 @@ def _check_dead_centres(closure: Closure, motion: Rates) -> None:
         i = int(dead[0])
         raise DeadCentreError(
             f"theta1 = {closure.crank_angle[i]:.9g} rad is a dead centre (dS4/dtheta1 = {motion.ratio[i]:.1e} m/rad): the "
-            "torque does not determine the slider's force there; give the slider's force, or leave the point out",
-            tuple(int(point) for point in dead),
+            "torque does not determine the slider's force there; give the slider's force, or leave the point out"
         )
-
-
-def _axes(frame: Dual) -> Dual:
-    """Return a frame with the axes of ``frame`` and the origin of frame 1."""
-    return Dual(frame.real)
-
-
-def _rod_axes(closure: Closure) -> FloatArray:
-    """Return the axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to rod and crank axis."""
-    i = closure.rod_frame.real[..., 0]
-    across = np.hypot(i[:, 0], i[:, 1])
-    if np.min(across) < 1e-12:
-        worst = int(np.argmin(across))
-        raise InputError(
-            f"the rod is parallel to the crank axis at theta1 = {closure.crank_angle[worst]:.6g} rad: frame 3 needs an angle "
-            "between them; take the components in another frame"
-        )
-    j = np.stack([-i[:, 1], i[:, 0], np.zeros_like(across)], -1) / across[:, None]
-    return np.stack([i, j, np.cross(i, j)], -1)
-
-
-_FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
-    1: lambda closure: np.broadcast_to(np.eye(3), (closure.crank_angle.size, 3, 3)),
-    2: lambda closure: closure.crank_frame.real,
-    3: _rod_axes,
-    4: lambda closure: closure.guide_frame.real,
-}
 
 
 # Comparison with vector mechanics
@@ -417,10 +361,6 @@ class Comparison:
     length_residual: float
     iterations: int
     rod_moment: float
-
-    def agrees(self, tolerance: float) -> bool:
-        """Return whether all relative differences are within a tolerance."""
-        return all(d.relative <= tolerance for d in self.differences)
 
 
 def compare(turn: ForceTurn) -> Comparison:

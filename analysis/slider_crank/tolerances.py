@@ -273,11 +273,9 @@ class Tolerance:
     ----------
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
-    half_width : float or str, optional
+    half_width : float or str
         Half the width of the tolerance zone, in the SI unit of the quantity in error, or text with a unit, such as "0.1 mm".
         For a normal distribution it is three standard deviations; a few errors then lie outside the zone.
-    standard_deviation : float, optional
-        Standard deviation, instead of the half width.
     distribution : str
         "normal", "uniform" or "triangular".
 
@@ -286,27 +284,21 @@ class Tolerance:
     ParameterError
         If there is no such error.
     InputError
-        If not exactly one of half width and standard deviation is given, if it is not a finite number above zero, or if the
-        distribution is not one of the three.
+        If the half width is not a finite number above zero, or the distribution is not one of the three.
     """
 
     name: str
-    half_width: Amount = None
-    standard_deviation: Amount = None
+    half_width: Amount
     distribution: str = "normal"
 
     def __post_init__(self) -> None:
         check_names((self.name,), ERRORS, "error")
-        for field in ("half_width", "standard_deviation"):
-            what = f"{field.replace('_', ' ')} of {self.name}"
-            object.__setattr__(self, field, si(getattr(self, field), ERRORS[self.name], what))
+        value = si(self.half_width, ERRORS[self.name], f"half width of {self.name}")
+        object.__setattr__(self, "half_width", value)
         if self.distribution not in _DISTRIBUTIONS:
             raise InputError(
                 f"the distribution of {self.name} is {self.distribution!r}: it must be one of {', '.join(_DISTRIBUTIONS)}"
             )
-        if (self.half_width is None) == (self.standard_deviation is None):
-            raise InputError(f"the tolerance of {self.name} must have either a half width or a standard deviation")
-        value = self.half_width if self.half_width is not None else self.standard_deviation
         if value is None or not (isfinite(value) and value > 0.0):
             found = f"{value!r} {ERRORS[self.name]}".rstrip()
             raise InputError(f"the tolerance of {self.name} is {found}: it must be a finite number greater than zero")
@@ -314,24 +306,15 @@ class Tolerance:
     @property
     def deviation(self) -> float:
         """Return the standard deviation."""
-        if self.standard_deviation is not None:
-            return float(self.standard_deviation)
         return float(self.half_width) / _DISTRIBUTIONS[self.distribution][0]
-
-    @property
-    def extent(self) -> float:
-        """Return half the width of the tolerance zone; for a normal distribution three standard deviations."""
-        if self.half_width is not None:
-            return float(self.half_width)
-        return self.deviation * _DISTRIBUTIONS[self.distribution][0]
 
     def draw(self, generator: np.random.Generator, samples: int) -> FloatArray:
         """Draw random errors, shape (samples,)."""
         if self.distribution == "normal":
             return generator.normal(0.0, self.deviation, samples)
         if self.distribution == "uniform":
-            return generator.uniform(-self.extent, self.extent, samples)
-        return generator.triangular(-self.extent, 0.0, self.extent, samples)
+            return generator.uniform(-self.half_width, self.half_width, samples)
+        return generator.triangular(-self.half_width, 0.0, self.half_width, samples)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -397,7 +380,7 @@ def tolerance_effects(
     names = check_tolerances(tolerances)
     first = sensitivities(turn, names, quantities)
     deviations = np.array([t.deviation for t in tolerances])
-    extents = np.array([t.extent for t in tolerances])
+    extents = np.array([t.half_width for t in tolerances])
     kurtoses = np.array([_DISTRIBUTIONS[t.distribution][1] for t in tolerances])
     n, m = len(turn), len(names)
     near_pole = _near_pole(turn, names, extents)

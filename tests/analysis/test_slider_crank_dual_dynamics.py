@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from scipy.optimize import brentq
 
-from analysis.slider_crank import DeadCentreError, JointLoads, Rates, close, follow, joint_loads, rates
+from analysis.slider_crank import DeadCentreError, JointLoads, Rates, close, joint_loads, rates
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from tests.published_rahman import DEAD_CENTRES_DEG, INCH, OFFSETS_IN, POUND_FORCE, SHIFTS_IN, TORQUE_LB_IN, TWISTS_DEG
-from tests.slider_cranks import Case, cases, seeded
+from tests.slider_cranks import Case, cases, components, seeded
 
 several = settings(max_examples=40, derandomize=True, deadline=None)
 every_case = pytest.mark.parametrize(("offset", "twist"), list(product(OFFSETS_IN, TWISTS_DEG)))
@@ -61,7 +61,7 @@ def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis(offset: float, 
         assert np.abs(found.residual).max() < 1e-9 * np.abs(found.bearing_moment).max()
         (clear,) = np.nonzero(np.abs(rates(at, speed=1.0).ratio) > 0.02 * p.crank_length)
         torque = found.torque[clear]
-        sought = joint_loads(at.at(clear), speed=CRANK_SPEED, torque=torque)
+        sought = joint_loads(close(p, COARSE[clear], shift * INCH), speed=CRANK_SPEED, torque=torque)
         np.testing.assert_array_equal(sought.torque, torque)
         assert_same(sought, [expected[i] for i in clear], 1e-9)
 
@@ -91,18 +91,6 @@ def test_agrees_with_vector_mechanics_for_random_mechanisms_and_motions(case: Ca
     lever = abs(k.kth) / p.crank_length
     if lever > 1e-3:
         assert_same(joint_loads(found, **motion, torque=expected[0].torque), [expected], 1e-10 / lever + 1e-9)
-
-
-def test_points_and_start_of_the_iteration_do_not_matter() -> None:
-    """Continuation gives the rod another spin than closing each point for itself; the forces are the same."""
-    p = seeded(5).parameters
-    th = np.linspace(0.0, 0.5, 6) + seeded(5).state[0]
-    s1 = seeded(5).state[1]
-    motion = {"speed": 3.0, "shift_velocity": 0.4, "acceleration": -7.0, "shift_acceleration": 2.0, "slider_force": 5.0}
-    one, other = joint_loads(close(p, th, s1), **motion), joint_loads(follow(p, th, s1), **motion)
-    assert np.abs(one.closure.crank_ball - other.closure.crank_ball).max() > 1e-3
-    for name in (*FORCES, *MOMENTS):
-        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9)
 
 
 # ------------------------------------------------------------------ rates
@@ -135,9 +123,6 @@ def test_rates_are_those_of_the_dual_velocities(seed: int) -> None:
     np.testing.assert_array_equal(now.slider.real, 0.0)
 
 
-# ------------------------------------------------------------------ balances that no joint enters
-
-
 # ------------------------------------------------------------------ frames
 
 
@@ -146,26 +131,9 @@ def test_statements_of_the_thesis_on_single_components() -> None:
     found = joint_loads(close(parameters(10.0), TURN + 0.01, 3.5 * INCH), speed=CRANK_SPEED, torque=CRANK_TORQUE)
     np.testing.assert_allclose(found.guide_moment, 0.0, atol=1e-10)
     # the force of the rod on the crank, in frame 2
-    on_crank = -found.components("crank_pin", 2) / POUND_FORCE
+    on_crank = -components(found, "crank_pin", 2) / POUND_FORCE
     np.testing.assert_allclose(on_crank[:, 1], -TORQUE_LB_IN / 12.0, rtol=1e-9)
     assert np.abs(on_crank[:, 2]).max() > 1.0
-
-
-def test_frame_3_needs_an_angle_between_rod_and_crank_axis() -> None:
-    p = replace(parameters(0.0, 0.0), guide_offset=-12.0 * INCH)
-    found = joint_loads(close(p, 0.0, 0.0), speed=1.0, slider_force=1.0)
-    assert np.all(np.isfinite(found.components("crank_pin", 2)))
-    with pytest.raises(InputError, match="parallel to the crank axis at theta1 = 0 rad"):
-        found.components("crank_pin", 3)
-
-
-@pytest.mark.parametrize(
-    ("name", "frame", "message"), [("guide", 5, "frames are 1"), ("torque", 1, "names are bearing")]
-)
-def test_unknown_frames_and_names_are_reported(name: str, frame: int, message: str) -> None:
-    found = joint_loads(close(parameters(), 0.3, 0.0), speed=1.0, slider_force=1.0)
-    with pytest.raises(InputError, match=message):
-        found.components(name, frame)
 
 
 # ------------------------------------------------------------------ errors
@@ -180,9 +148,8 @@ def test_dead_centres_are_reported(offset: float) -> None:
         for guess in near
     ]
     assert np.degrees(exact) == pytest.approx(DEAD_CENTRES_DEG[offset], abs=0.005)
-    with pytest.raises(DeadCentreError, match="is a dead centre") as error:
+    with pytest.raises(DeadCentreError, match="is a dead centre"):
         joint_loads(close(p, [0.1, *exact], 0.0), speed=CRANK_SPEED, torque=1.0)
-    assert error.value.points == (1, 2)
     joint_loads(close(p, exact, 0.0), speed=CRANK_SPEED, slider_force=1.0)
 
 

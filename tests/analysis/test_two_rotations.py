@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from analysis.numerics.dual import skew
 from analysis.slider_crank import close, settle
-from analysis.slider_crank.closure import chain, freedoms, planar
+from analysis.slider_crank.closure import chain, planar
 from analysis.units import INCH
 from linkwork.slider_crank.published import parameters
 from tests.published_rahman import GREATEST_SHIFTS_IN, OFFSETS_IN
@@ -36,7 +36,12 @@ def test_its_chain_has_one_freedom(shift: float, angle: float) -> None:
     """So a crank angle and a shift cannot both be given. With a third rotation in each ball joint it would be three, two and
     the spin of the rod."""
     p = parameters(10.0)
-    assert freedoms(p, angle, shift * INCH, settle(p, angle, shift * INCH).unknowns[0]) == 1
+    found = settle(p, angle, shift * INCH)
+    _, screws = chain(p, found.crank_angle, found.shift, found.unknowns)
+    of_crank = np.zeros((6, 2))
+    of_crank[2, 0] = of_crank[5, 1] = 1.0
+    columns = np.concatenate([of_crank, np.concatenate([screws.real[0], screws.dual[0] / p.rod_length])], -1)
+    assert 7 - np.linalg.matrix_rank(columns / np.linalg.norm(columns, axis=0), tol=1e-9) == 1
 
 
 # offset, shift (in), twist (deg)

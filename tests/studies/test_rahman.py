@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis import studies
 from analysis.cli import main
 from analysis.numerics.dual import Dual
-from analysis.slider_crank import JointLoads, close, follow, joint_loads
+from analysis.slider_crank import JointLoads, close, joint_loads
 from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, iteration, method, rates
@@ -38,6 +38,7 @@ from ..published_rahman import (
     TORQUE_LB_IN,
     TWISTS_DEG,
 )
+from ..slider_cranks import components
 from .results import check, every, marks_of, result, statement
 
 #: For each erratum: the study, how the statement that fails begins, its case, and by how much.
@@ -401,9 +402,7 @@ class TestStatements:
         mechanism, shift = parameters(case.offset_in, case.twist_deg), case.shift_in * INCH
         clear_of = rahman.clear_mask(case)
         angles = np.degrees(THETA)[clear_of]
-        turned = follow(mechanism, np.radians(np.arange(0.0, 361.0, 20.0)), shift)
-        closed = close(mechanism, np.radians(angles), shift, turned.at((angles // 20.0).astype(int)))
-        loads = joint_loads(closed, speed=CRANK_SPEED, torque=CRANK_TORQUE)
+        loads = joint_loads(close(mechanism, np.radians(angles), shift), speed=CRANK_SPEED, torque=CRANK_TORQUE)
         for component in COMPONENTS.values():
             found = rahman.values(case, component)[clear_of]
             scale = TORQUE_LB_IN if component.unit == "lb.in" else TORQUE_LB_IN / CRANK_IN
@@ -415,7 +414,7 @@ def in_thesis(loads: JointLoads, component: Component) -> FloatArray:
     if component.source in ("axial_force", "slider_force"):
         si = loads.axial if component.source == "axial_force" else loads.slider_force
     else:
-        si = loads.components(component.source, component.frame)[:, component.axis]
+        si = components(loads, component.source, component.frame)[:, component.axis]
     return component.sign * si / {"lb": POUND_FORCE, "lb.in": POUND_INCH}[component.unit]
 
 

@@ -174,7 +174,7 @@ def _sensitivity_table(
     for name in exact.derivatives:
         si = sc.QUANTITIES[name]
         clear = turn.clear(poles=si in ("N", "N.m"))
-        effect = max(float(np.ma.abs(exact.derivative(name, t.name)).max()) * t.extent for t in allowed)
+        effect = max(float(np.ma.abs(exact.derivative(name, t.name)).max()) * t.half_width for t in allowed)
         for t in allowed:
             below = sc.ERRORS[t.name]
             unit, scale = _unit_quotient(units.name(si), units.name(below)), units.factor(si) / units.factor(below)
@@ -183,7 +183,7 @@ def _sensitivity_table(
             greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
             top = int(np.argmax(greatest))
             # a value that is only a rounding error compared with the greatest effect of any tolerance is printed as zero
-            tiny = 1e-12 * effect / t.extent * scale
+            tiny = 1e-12 * effect / t.half_width * scale
             here, most = (_number(values[i] if np.ma.abs(values[i]) > tiny else values[i] * 0.0) for i in (place, top))
             # there may be no angle that is far enough from poles and limits
             ends = (most, f"{_degrees(turn, top):.1f}") if greatest[top] >= 0.0 else ("none", "")
