@@ -7,6 +7,7 @@ Rahman's figure 5. `STUDIES` lists the studies' titles in order; `load` imports 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -56,7 +57,7 @@ def load(number: str) -> Study:
     if number not in STUDIES:
         raise unknown_name(number, STUDIES, f"study of figure {number!r}")
     study: Study = import_module(f"{__name__}.{ENTRIES[number].module}").STUDIES[number]
-    return study
+    return replace(study, number=number)
 
 
 def make(

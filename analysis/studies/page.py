@@ -1,11 +1,10 @@
-"""Write the Markdown page of a thesis: figures with plots and statements, findings of the chapters, number of statements."""
+"""Write the Markdown page of a thesis: figures with plots and statements, and the number of statements."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from importlib import import_module
 from pathlib import Path
 
 from ..figures import Figure, resize
@@ -26,12 +25,10 @@ _STATEMENT = re.compile(
 def figures(numbers: Iterable[str], folder: Path) -> str:
     """Compute the figures with these numbers and return their Markdown text; the plots go into ``folder``.
 
-    A chapter's findings come before its first figure. A figure that only shows a mechanism or an apparatus has only its title
-    and place. An assignment that several figures share is printed with the first of them.
+    A figure that only shows a mechanism or an apparatus has only its title and place. An assignment that several figures share
+    is printed with the first of them.
     """
-    numbers = tuple(numbers)
-    modules = dict.fromkeys(f"{__package__}.{ENTRIES[n].module}" for n in numbers if n in STUDIES)
-    lines = [f"{findings}\n" for name in modules if (findings := getattr(import_module(name), "FINDINGS", ""))]
+    lines: list[str] = []
     for number in numbers:
         entry = ENTRIES[number]
         if number not in STUDIES:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,6 @@ class StudyResult:
 
     Attributes
     ----------
-    number : str
-        Number of the thesis's figure, or name of a study of our own.
     claim : str
         Claim or content of the figure, as far as the thesis's text tells.
     assignment : str
@@ -36,14 +34,16 @@ class StudyResult:
     statements : tuple of Statement
     see : str
         Number of the figure whose statements are also about this figure; empty if there is none.
+    number : str
+        Number of the thesis's figure, or name of a study of our own; `Study.compute` sets it.
     """
 
-    number: str
     claim: str
     assignment: str = ""
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     statements: tuple[Statement, ...] = ()
     see: str = ""
+    number: str = ""
 
     @property
     def title(self) -> str:
@@ -61,14 +61,19 @@ class StudyResult:
 class Study:
     """Study of a figure of a thesis, or of statements without a figure: the functions that compute, draw and animate it.
 
-    ``sweeps`` are the parameters whose values the study itself compares; the reader cannot set them.
+    ``sweeps`` are the parameters whose values the study itself compares; the reader cannot set them. ``number`` is that in the
+    list of studies; `load` sets it.
     """
 
-    number: str
-    compute: Callable[[], StudyResult]
+    computed: Callable[[], StudyResult]
     draw: Callable[[StudyResult], Figure] | None = None
     animate: Callable[[StudyResult, Path], Path] | None = None
     sweeps: tuple[str, ...] = ()
+    number: str = ""
+
+    def compute(self) -> StudyResult:
+        """Compute the result of the study."""
+        return replace(self.computed(), number=self.number)
 
     def make(
         self, out: str | Path = "out", changes: Mapping[str, Any] | None = None

@@ -407,7 +407,6 @@ def closure() -> StudyResult:
             GRID_DEG, GRID_DEG[::2], error
         )
     return StudyResult(
-        number="rahman-closure",
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
         assignment=f"The iteration goes round the turn in steps of {STEP_DEG:g} deg. It starts from the planar estimate at "
         "theta1 = 0, and then from the solution at the previous angle. It settles when a correction is below "
@@ -419,4 +418,4 @@ def closure() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-closure": Study("rahman-closure", ignore_changes(closure), draw)}
+STUDIES = {"rahman-closure": Study(ignore_changes(closure), draw)}

@@ -83,7 +83,6 @@ def conclusions() -> StudyResult:
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     place = text("section 3.3, L1131")
     return StudyResult(
-        number="rahman-conclusions",
         claim="Rahman states: the method serves the design of spatial mechanisms, and is general, concise and economical. What "
         "section 3.3 says of displacements, forces and convergence is judged at Figs R5, R8, R14 and in "
         "rahman-closure.",
@@ -127,4 +126,4 @@ def conclusions() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-conclusions": Study("rahman-conclusions", ignore_changes(conclusions))}
+STUDIES = {"rahman-conclusions": Study(ignore_changes(conclusions))}

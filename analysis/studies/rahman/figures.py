@@ -57,28 +57,6 @@ from .table import (
 
 FloatArray = NDArray[np.float64]
 
-#: Text at the head of the figures.
-FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
-matrices. From this it finds velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Most of its
-algebra is right: the matrices and operators, the accelerations except 38a, the momenta, their rates, and the inertia forces;
-in five equations a symbol is uncertain in our scan (erratum 9). In the plane, its forces agree with Newton and Euler once
-errata 5 and 6 are mended.
-
-Out of the plane the method fails. A ball joint has three rotations, but eqs 2 and 3 give it two (erratum 1). The chain
-therefore has one freedom, and crank angle and shift cannot both be given. The iteration stops where its steps become small,
-on loops that are open by up to 38 deg, with the slider wrong by up to 6 in. If we add the steps of Davidon, Fletcher and
-Powell in our own way, the loops stay open too. The limits of S1 and alpha4 within which "the program converges" are limits of
-this iteration, not of the mechanism, and we find the same except at a4 = 10 and 20 in. Without an offset, rounding errors
-decide from 0.5 to 2 in. The mechanism works far beyond these limits. Its greatest shift falls with the offset, although the
-thesis infers that it rises. The thesis sets the axial force on the crank to zero, but this force is an unknown (erratum 7).
-Therefore 2F2k is not zero, and the printed bearing moments 1T1i and 1T1j lack a part.
-
-Two of the conclusions on the engine hold: the displacements are almost sinusoidal, and a shift does load the bearing with two
-more moments. Others do not: the offset lengthens the stroke and saves no power, and clear of the dead centres most forces
-do not grow at every step of the offset. The spikes near 100 and 300 deg are not roundoff. They are the dead centres, where a
-given torque has no lever arm on the slider. Among the cases of the graphs, the dead centres lie within 10 deg of these angles
-only for a4 = 20 in with alpha4 = 270 deg."""
-
 #: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
@@ -472,7 +450,6 @@ def compute(number: str) -> StudyResult:
         claim = f"{shown} over a turn of the crank for variable {family}, beside the ideal case."
     assignment = "" if number == CONSTANT else INFERRED
     return StudyResult(
-        number=number,
         claim=claim,
         assignment=assignment,
         columns=pad_columns(columns),
@@ -556,6 +533,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The studies by the figure's number with an R before it.
-STUDIES = {
-    number: Study(number, partial(compute, number), draw, sweeps=("guide.offset", "guide.twist")) for number in FIGURES
-}
+STUDIES = {number: Study(partial(compute, number), draw, sweeps=("guide.offset", "guide.twist")) for number in FIGURES}

@@ -581,7 +581,6 @@ def forces() -> StudyResult:
     a = joint_accelerations(CRANK_AT_SPEED, GENERAL, r)
     general = joint_forces(CRANK_AT_SPEED, bodies(parameters()), GENERAL, r, a, TORQUE)
     return StudyResult(
-        number="rahman-forces",
         claim="Rahman states: in the plane the program gives the same as the complex algebra method.",
         columns=pad_columns(columns),
         statements=(
@@ -614,4 +613,4 @@ def forces() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-forces": Study("rahman-forces", ignore_changes(forces), draw)}
+STUDIES = {"rahman-forces": Study(ignore_changes(forces), draw)}

@@ -355,7 +355,6 @@ def rates() -> StudyResult:
         columns[f"opening of the loop as printed; {case.name} [in/s]"] = lacking
         columns[f"opening of the loop mended; {case.name} [in/s]"] = mended
     return StudyResult(
-        number="rahman-rates",
         claim="Rahman states: eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
         columns=pad_columns(columns),
         statements=(*_frame_velocities(), *_solved(), *_derivatives(), _denominators(), _abnormal()),
@@ -363,4 +362,4 @@ def rates() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-rates": Study("rahman-rates", ignore_changes(rates), method.draw)}
+STUDIES = {"rahman-rates": Study(ignore_changes(rates), method.draw)}

@@ -37,33 +37,6 @@ from .runs import (
     table_3_1,
 )
 
-FINDINGS = """\
-**Claims.** Chapter II and section 3.1 write the equations of motion with Lagrange's multipliers, state that these are the pin
-forces, and advise integrating all second derivatives, so that the closure of the loop checks the integration. Sections 3.2 and
-3.3 compute the linkage of Table 3.1: without a spring, with three springs, launched by a torque, and in free motion.
-
-**What stands.** The equations of motion are right, except for a cosine in (2.20) that must be a sine; so are (3.8) and (3.10),
-except for a minus that our scan lacks. The multipliers are the crank torque and the force in the pin where the loop is broken,
-C in (3.8). At constant speed the failure of closure does show the error of the integration: it is some five to fifteen times
-the slider's error. In a launch with short steps it is far smaller than the error. The program of appendix 1 prints the closure
-but integrates the slider alone, so that its own check shows nothing. The torque reverses near 0 deg and hardly depends on the
-spring. The linear rise of the speed in a launch, the decay by the damper, the phase planes, and half the natural frequency
-near 27 rad/s are as described.
-
-**What does not.** Without a spring the slider does not drift along a line. The mean of the inertia forces pushes it towards
-the crank, the more strongly the nearer it comes, so that ten turns look straight only with the two strongest dampers. With
-these two no transient can be seen; with the others the motion never gets steady. Gravity holds the drift back: without it, the
-size of M with these two dampers is greater by a quarter, so that M is not slightly reduced. With the softer springs the
-transient outlasts the first cycle. With the stiffest spring the least position comes at 5 deg, not at 0, u rises 1.6 times as
-steeply as with the softest, and the inertia force exceeds the spring force; a still stiffer spring does not make the slope
-constant. The least value of the torque does vary with the spring, but not because the slider's accelerations differ: they make
-3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the
-slider moves to both sides of its start. The second harmonic relative to the first goes on growing from 27 down to 22 rad/s. It
-is not an effect non-linear in u, since the equation linear in u has it too. Finally, not every predictor-corrector method is
-stable: Milne's classical one is weakly unstable, and for an undamped oscillation Hamming's is stable only with steps a tenth
-as long as Runge-Kutta's.
-"""
-
 ANGLE = "crank angle [deg]"
 STIFFNESS_LEGEND = "stiffness k [dyn/cm]"
 
@@ -97,7 +70,6 @@ def steady_result() -> StudyResult:
     columns[TURNS] = np.linspace(0.0, 3.0, len(next(iter(starts.values()))))
     columns |= {f"u from the start; {_k(k)} [cm]": CM_PER_METRE * run["slider.position"] for k, run in starts.items()}
     return StudyResult(
-        number="3.4",
         assignment='The scan has "220" for the crank angle of the least position (L1962): read as 22 deg.',
         claim="After a transient of one turn the slider oscillates steadily between its start and the crank shaft. A "
         "stiffer spring moves the mean position towards the start, and the least position to a smaller crank angle.",
@@ -361,7 +333,6 @@ def torque_result() -> StudyResult:
     columns = {ANGLE: turns[1e6].angle_deg}
     columns |= {f"crank torque; {_k(k)} [N.m]": turn.torque for k, turn in turns.items()}
     return StudyResult(
-        number="3.5",
         claim="The torque that holds the speed reverses suddenly about crank angle 0. It depends on the spring only at its "
         "extremes, where the slider's accelerations differ.",
         columns=columns,
@@ -525,12 +496,9 @@ def draw_torque(result: StudyResult) -> Figure:
 
 #: The studies by number.
 STUDIES = {
-    study.number: study
-    for study in (
-        *no_spring.STUDIES,
-        Study("3.4", steady_result, draw_steady),
-        Study("3.5", torque_result, draw_torque, sweeps=("slider.stiffness",)),
-        *launches.STUDIES,
-        *free_crank.STUDIES,
-    )
+    "3.4": Study(steady_result, draw_steady),
+    "3.5": Study(torque_result, draw_torque, sweeps=("slider.stiffness",)),
+    **no_spring.STUDIES,
+    **launches.STUDIES,
+    **free_crank.STUDIES,
 }

@@ -36,29 +36,6 @@ from ..statements import Case, Statement, at_least, at_most, listing, near, text
 from ..study import Study, StudyResult
 from .runs import ALIKE_WORDS, SIGN
 
-FINDINGS = """\
-**Claims.** Sections 4.1 to 4.4 linearise the mechanism about the four-bar with its slider at rest. The result is one equation
-(4.21) with periodic coefficients, of which two harmonics are balanced. Section 4.5 finds that the resonance lies within 1
-rad/s below the frequency of the spring with rocker and slider alone, that this distance is proportional to the rocker's
-inertia, that the first harmonic is dominant, and how a damper acts on it.
-
-**What stands.** The equations of motion (4.10) to (4.20) and the linearised kinematics (4.8) are right. For a massless coupler
-and the rocker's mass centre on the slider, the inertia of (4.21) and its force as in the listing are right to first order. The
-resonance lies below omega_k by about 1 rad/s for each unit of I4, nearly all of it due to the mean of the rocker's inertia; at
-I4 = 0 it is that of a mass on a spring. Amplitudes grow with I4, and so do the widths at a given amplitude. The damper acts
-only near the resonance, where the curves are those of a single mass. The motion must be small: with the least damper of
-appendix 2, I4 = 1, the linear equation gives a peak of 1.03 l4, where the mechanism has 0.68.
-
-**What does not.** (4.21) lacks M' zeta', the rate of the periodic mass, and its H1 is three times too large. The expansion
-(4.23) keeps harmonics of second order but not the second-order part of the mean, and (4.34) has lambda_c in place of lambda_c
-k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of spring and damper, and its K
-is wrong. Its resonances are therefore 0.02 to 0.04 rad/s too low at I4 = 0.5 and 1, which its steps of 0.1 rad/s hide. The
-force of (4.21) is right only to first order: its second harmonic is a third of the right one, and a sixth with the halved
-factors, so that the slider's second harmonic is about seven times too small. This is why the thesis could call the second
-harmonic negligible everywhere. In truth it is negligible, at the same speed, only above 22 rad/s, and near half the natural
-frequency it exceeds the first. The frequency of the free motion falls with the damper, by 5 mrad/s, but the peaks of the
-curves, which the figures show, move to higher speeds."""
-
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 for which appendix 2 gives the resonance.
 INERTIA_RATIOS = (0.5, 1.0, 1.5)
@@ -203,7 +180,6 @@ def compute_first() -> StudyResult:
     below = {ratio: deviation(ratio) for ratio in INERTIA_RATIOS}
     by_mean = {ratio: OMEGA_K - OMEGA_K / sqrt(equation(ratio, Variant.EXACT).mass.mean) for ratio in below}
     return StudyResult(
-        number="4.3",
         claim="First harmonic over the crank speed without damping, for three inertia ratios.",
         assignment="The three inertia ratios are our choice: 1 and 0.5 of Fig 4.6 and 4.7, and 1.5.",
         columns=undamped_columns(1),
@@ -281,7 +257,6 @@ def compute_second() -> StudyResult:
         for n, word in ((1, "first"), (2, "second"))
     }
     return StudyResult(
-        number="4.4",
         claim="Second harmonic over the crank speed without damping, for three inertia ratios.",
         assignment="The three inertia ratios are our choice, as in Fig 4.3.",
         columns=columns,
@@ -364,7 +339,6 @@ def compute_deviation() -> StudyResult:
     still = equation(0.0, Variant.EXACT)
     rest = max(np.abs(s.exponential).max() for s in (still.mass + -1.0, still.stiffness, still.force))
     return StudyResult(
-        number="4.5",
         claim="The deviation of the resonance from omega_k falls linearly with the inertia ratio, to zero.",
         assignment="The range of I4 is our choice.",
         columns=columns,
@@ -475,7 +449,7 @@ def damper_effects(inertia_ratio: float) -> dict[str, float]:
     }
 
 
-def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
+def compute_damped(inertia_ratio: float) -> StudyResult:
     """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the program in appendix 2."""
     columns = {"speed [rad/s]": CLOSE}
     for omega_c in (0.0, *DAMPERS):
@@ -486,12 +460,11 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
     plant = [nonlinear_harmonic_balance(mechanism, speed).harmonic(1) for speed in CLOSE.tolist()]
     columns[f"omega_c = {STRONGEST:g} 1/s; plant [1]"] = np.array(plant) / mechanism.rocker_length
     return StudyResult(
-        number=number,
         claim=f"First harmonic over the crank speed with dampers, I4 = {inertia_ratio:g}.",
         assignment="The dampers are those of the listing of appendix 2. We take the amplitude to be that of the first "
         "harmonic.",
         columns=columns,
-        statements=_curves() if number == "4.6" else _dampers(),
+        statements=_curves() if inertia_ratio == 1.0 else _dampers(),
     )
 
 
@@ -590,12 +563,9 @@ def draw_damped(result: StudyResult) -> Figure:
 
 #: The studies by number.
 STUDIES = {
-    study.number: study
-    for study in (
-        Study("4.3", compute_first, partial(draw_undamped, n=1)),
-        Study("4.4", compute_second, partial(draw_undamped, n=2)),
-        Study("4.5", compute_deviation, draw_deviation),
-        Study("4.6", partial(compute_damped, "4.6", 1.0), draw_damped),
-        Study("4.7", partial(compute_damped, "4.7", 0.5), draw_damped),
-    )
+    "4.3": Study(compute_first, partial(draw_undamped, n=1)),
+    "4.4": Study(compute_second, partial(draw_undamped, n=2)),
+    "4.5": Study(compute_deviation, draw_deviation),
+    "4.6": Study(partial(compute_damped, 1.0), draw_damped),
+    "4.7": Study(partial(compute_damped, 0.5), draw_damped),
 }

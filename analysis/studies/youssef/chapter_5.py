@@ -40,31 +40,6 @@ from .linearised import with_crank
 from .regions import LOOKS, WAYS, appendix_3_region, axis, crank_speed, equation, hill_region, orbit_region
 from .runs import SIGN
 
-FINDINGS = """\
-**Claims.** Chapter V takes the homogeneous equation (4.29) and finds its first region of instability, near twice the
-natural frequency, by perturbation and by a determinant. It follows this region over the rocker's inertia, the crank's
-length and the coupler's length, and removes it with a damper.
-
-**What stands.** The formulas (5.13), (5.16), (5.26) and the determinant (5.35) agree with each other. The region is
-narrow, widens with I4 and with the crank's length, and moves away from A = 2 in proportion to I4. A damper narrows and
-removes it; over I4 and over the crank's length, 0.45 1/s is more than twice what is needed.
-
-**What does not.** The equation lacks M' zeta' and is linearised about zeta = 0, which is not a motion of the slider. For this
-reason, and because of a wrong K, halved harmonics of the mass and a lost 1/k0, the region of the listing is 2.7 times too
-wide: 0.25786 to 0.26031 at I4 = 0.5, where the right linear equation has 0.25832 to 0.25922. A damper of 0.167 1/s removes
-the region up to I4 = 1.5, where the listing needs 0.459. The second region is not negligible: it is half as wide as the
-first, and wider than the first with the longest crank. The axes of Figs 5.2 and 5.3 are not those of I4 = 1 and 2, which
-the text has, but nearly those of I4 = 0.5, which the listing has. Fig 5.3 varies the coupler with the angles held, which
-requires another ground link at each length. On the same ground link the region widens when the coupler is longer than about
-sigma3 = 1. Nor is the region of Fig 5.3 narrower than those of Figs 5.1 and 5.2. With two harmonics of the coefficients the
-determinant does not give the third region, and with nine terms it does not give the fourth. Without a damper, (5.35) is
-satisfied at every stable speed, not only at the boundaries. The zeroth boundary does not separate two stable regions: at
-higher speeds the slider falls away, and a damper only slows it.
-
-**What cannot be told.** The text gives no times of computation, and not the range of I4 in Fig 5.1. Remarks on the labour of
-the methods (L3641, L3734) claim nothing that can be measured, and have no verdict.
-"""
-
 #: Inertia ratios of appendix 3 whose regions are compared.
 COMPARED = (0.5, 1.0, 1.5)
 #: Tolerance of the axis A, in words.
@@ -80,7 +55,6 @@ class Sweep:
     is computed.
     """
 
-    number: str
     symbol: str
     label: str
     values: Sequence[float]
@@ -119,7 +93,6 @@ def compute_sweep(number: str) -> StudyResult:
         columns[f"lambda_k^2; {way}; low [1]"] = np.array([region.low for region in these])
         columns[f"lambda_k^2; {way}; high [1]"] = np.array([region.high for region in these])
     return StudyResult(
-        number=number,
         claim=sweep.claim,
         assignment=sweep.assignment,
         columns=columns,
@@ -469,46 +442,40 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
 
 
 SWEEPS = {
-    sweep.number: sweep
-    for sweep in (
-        Sweep(
-            number="5.1",
-            symbol="I4",
-            label="inertia ratio I4",
-            values=np.linspace(0.25, 2.0, 8).tolist(),
-            mechanism=chapter_4,
-            claim="The first region of instability in lambda_k^2 over I4; sigma2 = 0.05.",
-            judge=judge_inertia,
-            assignment="I4 = 0.25 to 2 in steps of 0.25 is our choice. Remarks a and b (L3938-3946) speak of stability, "
-            "which we read as a narrow region. The true periodic motion is the motion of the mechanism itself.",
+    "5.1": Sweep(
+        symbol="I4",
+        label="inertia ratio I4",
+        values=np.linspace(0.25, 2.0, 8).tolist(),
+        mechanism=chapter_4,
+        claim="The first region of instability in lambda_k^2 over I4; sigma2 = 0.05.",
+        judge=judge_inertia,
+        assignment="I4 = 0.25 to 2 in steps of 0.25 is our choice. Remarks a and b (L3938-3946) speak of stability, "
+        "which we read as a narrow region. The true periodic motion is the motion of the mechanism itself.",
+    ),
+    "5.2": Sweep(
+        symbol="sigma2",
+        label="crank's length sigma2 = l2/l4",
+        values=np.linspace(0.01, 0.1, 10).tolist(),
+        mechanism=with_crank,
+        claim="The first region of instability in lambda_k^2 over sigma2; I4 = 1.",
+        judge=judge_crank,
+    ),
+    "5.3": Sweep(
+        symbol="sigma3",
+        label="coupler's length sigma3 = l3/l4",
+        values=np.linspace(0.8, 1.2, 17).tolist(),
+        mechanism=with_held_angles,
+        claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
+        judge=judge_coupler,
+        assignment=(
+            "The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
+            "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We also "
+            "vary the coupler on the same ground link."
         ),
-        Sweep(
-            number="5.2",
-            symbol="sigma2",
-            label="crank's length sigma2 = l2/l4",
-            values=np.linspace(0.01, 0.1, 10).tolist(),
-            mechanism=with_crank,
-            claim="The first region of instability in lambda_k^2 over sigma2; I4 = 1.",
-            judge=judge_crank,
-        ),
-        Sweep(
-            number="5.3",
-            symbol="sigma3",
-            label="coupler's length sigma3 = l3/l4",
-            values=np.linspace(0.8, 1.2, 17).tolist(),
-            mechanism=with_held_angles,
-            claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
-            judge=judge_coupler,
-            assignment=(
-                "The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
-                "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We also "
-                "vary the coupler on the same ground link."
-            ),
-            further={SAME_GROUND: with_same_ground},
-        ),
-    )
+        further={SAME_GROUND: with_same_ground},
+    ),
 }
 
 
 #: The studies by number.
-STUDIES = {number: Study(number, partial(compute_sweep, number), draw_sweep) for number in SWEEPS}
+STUDIES = {number: Study(partial(compute_sweep, number), draw_sweep) for number in SWEEPS}

@@ -39,30 +39,6 @@ from ..study import Study, StudyResult, pad_columns
 from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_function
 from .stated_errors import ROUNDED, judge_stated_error, printed_error, rounding_range
 
-FINDINGS = """\
-**Claims.** The downhill simplex, started from many random sets of lengths and angles, finds the four-bar with the least error
-for a curve with or without timing, or for a function of the rocker's angle. The chapter prints eight linkages, seven of them
-with their errors.
-
-**What stands.** The area by triangles is the area between the curves if the partners are chosen. The crank's phase does not
-change this area, and both closures of the links have to be tried. Weights act as stated. The linkages for ellipse and path
-(b) are less accurate than those for (a), which are close. The printed linkage for path (b) has the stated area once a digit
-is mended, and the packaging machine's push is straight to 3 % of its length. Searches that begin with 12 of the 72 points
-reach lower errors with fewer evaluations; searches that begin with 36 reach lower errors, but not with fewer evaluations.
-
-**What does not.** Six of the seven errors are not those of the printed linkages, even with the misprints that we found
-mended and each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. The errors of the two
-rocker functions differ from the stated ones by 0.3 to 0.4 % in the nearest of many readings. The linkages for ellipses and
-paths are not minima (L5136), and within our limits other linkages have a fortieth to a fifth of their errors (L7026). The
-search itself, repeated from the program, always stops before it reaches a minimum. Starting with five of the ten parameters
-gains nothing. Starting with nine gives lower errors, but needs more evaluations.
-
-**Our limits.** Without bounds the problem has no solution: the longer the links, the smaller the error. Therefore none of our
-links is longer than the longest of the printed linkage (Fig 6.6: its printed bounds, and r at most 30 cm), and the
-transmission angle is at least 40 deg. For the rocker functions the crank turns fully instead. Remarks on methods in general
-(L4055 to 4082) and descriptions of the program (L5146 to 5156) claim nothing that can be measured, and have no verdict.
-"""
-
 FloatArray = NDArray[np.float64]
 
 #: Lower bound on the transmission angle of our linkages (deg).
@@ -524,7 +500,6 @@ def compute(number: str) -> StudyResult:
     row = TABLE[number]
     rocker = row.problem.startswith("rocker")
     return StudyResult(
-        number=number,
         claim=row.claim,
         assignment=row.reading,
         columns=pad_columns(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
@@ -541,6 +516,4 @@ DRAW: Mapping[str, Callable[[StudyResult], Figure]] = {
 
 
 #: The studies by number.
-STUDIES = {
-    number: Study(number, partial(compute, number), DRAW[row.problem.split("-")[0]]) for number, row in TABLE.items()
-}
+STUDIES = {number: Study(partial(compute, number), DRAW[row.problem.split("-")[0]]) for number, row in TABLE.items()}

@@ -19,33 +19,6 @@ from ..rules import READ
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 
-FINDINGS = """\
-**Claims.** A four-bar whose rocker pivot slides under control reaches every point within the envelope of its coupler curves,
-so that the slider can correct what the links cannot trace. The chapter finds the slider's motion by a variational method,
-exact at each crank angle, and by a direct search for a Fourier series.
-
-**What stands.** Precision points may be kept while the motion between them changes. The coupler that points at the desired
-point gives exactly the least error. Two harmonics of the slider can reduce the error of all eight problems of chapter VI;
-that of the weighted rocker function falls to a fiftieth if the stroke is not limited. For path (b) the printed series gives
-the stated 4.3 cm2, within the rounding of its numbers, once l4 is mended as in chapter VI and A0 = 3.1 is read as 0.31; it
-is then within 5 % of the best that we find. A series with enough terms reaches what the variational method reaches. Cams of
-a few centimetres can drive such a slider. We tried a machine with twice the friction of the model, coupler and slider
-heavier by a tenth and a load of 6 N: a drive without feedback fails within half a turn, and feedback holds the motion to a
-quarter of a per cent of the stroke.
-
-**What does not.** The envelope has a hole where all curves of the family go round the same region. For two of our limits of
-U, P reaches only 74 and 89 % of the area within the envelope; with U from -1.5 to 1.5, where the crank turns fully except at
-+-0.5, it reaches all. If the coupler cannot point at the desired point, the rocker need not stand upright: for places below
-the slider's line it hangs. The printed series for the rocker function does not give the stated 4.8 deg2 in any reading that
-we tried (of its signs, of A0 and of its argument). As printed, the links cannot be joined; in the readings in which they
-can, the error is greater than with the pivot fixed.
-
-**What cannot be told.** Series 1 (Fig 7.4 to 7.10) rests on a desired curve that is lost. We draw its figures with a curve of
-our own, and give no verdict on what the thesis says about the lost curve. For a mechanism that corrects itself, the thesis
-states neither the adjustment nor the criterion. Methods that are only named, such as teach-in, latches or further inputs,
-have no example to judge. Remarks on the field and on the choice of a method (L5171 to 5201, 5276 to 5289, 5331, 5393, 5782,
-5877, 5892) are general knowledge or opinions, and have no verdict.
-"""
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 TARGET = "0.25"
@@ -122,7 +95,6 @@ def family() -> StudyResult:
     root = np.sqrt(np.maximum(square, 0.0))
     off_slider = np.abs(np.abs(1.0 + along - middle) - root).max()
     return StudyResult(
-        number="7.2",
         claim="With the slider free, P reaches any point on or within the outer boundaries of the family of coupler curves.",
         assignment="Links of series 1 (L5720): l2 = r = 0.5, l3 = l4 = 1. The values of U are lost: 0.6 to 1.4 are our "
         "choice. The crank turns fully from -1.5 to 1.5 except at +-0.5.",
@@ -234,4 +206,4 @@ def draw_family(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"7.2": Study("7.2", family, draw_family)}
+STUDIES = {"7.2": Study(family, draw_family)}

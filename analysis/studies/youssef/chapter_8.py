@@ -21,34 +21,6 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
 from . import rig_1, rig_2, rigs
 
-FINDINGS = """\
-**Claims.** Two rigs confirm the theory: rig 1 (vertical, springs A and B) the equations of chapters II and III, and rig 2
-(horizontal, with a crank of a twentieth of the links, springs C and D) the linearised equation of chapter IV. The measured
-curves are lost with the figures, so that no sentence that compares a measured curve with theory can be judged. We judge what
-the theory gives for the printed masses, springs and dampers at the stated speeds, and judge by it also a sentence that only
-describes a measured motion. The amplitude is half the range of the slider's position u over a turn. Sentences that describe
-the rigs, or tell what was done, claim nothing and have no verdict.
-
-**What stands.** The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
-A, four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies of rig 1 lie in the regions stated. Its
-amplitude has its maximum below resonance near half of these frequencies, at 290 and 577 rpm (290 and 580), if the springs,
-printed to one and two digits, have the values within their rounding that fit best; with the springs as printed it is at 296
-and 564 rpm. Within the same rounding the natural frequencies of rig 2 are those calculated. Rig 2 is in resonance at 586 and
-828 rpm (585 and 825), and its first harmonic is that of a damped mass on a spring under an unbalance. The linear equation of
-chapter IV, once corrected, agrees with the full equations within three per cent in amplitude at all speeds of rig 2.
-
-**What does not.** With spring A the minimum that follows this maximum is at 353 rpm or more, not at 345. At 500 rpm a shoulder
-is left of the peaks that have met. The third harmonic of rig 1 is up to 0.44 of the greater of the first two. The theory shows
-effects that the thesis did not see: at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half of
-that of rig 2. There rig 2 does not move like a sine, since the second harmonic is 0.9 (C) and 1.6 (D) times the first. The
-greatest second harmonic is 32 times smaller than the greatest first, not 50. With spring B the guide is said to have been too
-short at 800 rpm, but the slider moves more than twice as far near half the natural frequency, where the rig did run.
-
-**Why.** The thesis says that the resonance of rig 2 was wider, and the amplitude beyond it larger, than in theory. The terms
-that the linear equation ignores make both smaller. Friction and a stronger damper widen the resonance but lower the amplitude
-beyond it, and a weaker damper does the reverse: none of them does both.
-"""
-
 # --- 8.7 to 8.18: the slider over the crank angle
 
 
@@ -60,7 +32,6 @@ class Turns:
     friction in the guide; its coefficient is `SLIGHT`.
     """
 
-    number: str
     spring: str
     speeds: tuple[float, ...]
     claim: str
@@ -78,7 +49,6 @@ class Turns:
         columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(rigs.slider(next(iter(turns.values())))))}
         columns |= {f"slider position u; {name} [cm]": rigs.slider(found) for name, found in turns.items()}
         return StudyResult(
-            number=self.number,
             claim=self.claim,
             assignment=self.assignment,
             columns=columns,
@@ -106,11 +76,6 @@ class Turns:
             x_ticks=range(0, 361, 45),
         )
         return plot_curves([panel], title=result.heading)
-
-    @property
-    def study(self) -> Study:
-        """Return the study of the figure."""
-        return Study(self.number, self.compute, self.draw)
 
 
 #: Speeds of the figures (rpm).
@@ -443,11 +408,10 @@ _AGREE_A = (
     "Theory and experiment agree well, almost totally in phase; friction explains the slight variations of amplitude."
 )
 _AGREE_B = "Theory and experiment agree almost totally in phase; in amplitude not as well, but reasonably."
-TURNS = (
-    Turns("8.7", "A", (360.0,), "The steady motion of the slider is periodic with one crank cycle.", _periodic),
-    *(
-        Turns(
-            f"8.{n}",
+TURNS = {
+    "8.7": Turns("A", (360.0,), "The steady motion of the slider is periodic with one crank cycle.", _periodic),
+    **{
+        f"8.{n}": Turns(
             spring,
             (speed,),
             claim,
@@ -457,41 +421,36 @@ TURNS = (
         )
         for spring, claim, first, statements in (("A", _AGREE_A, 8, _compared_a), ("B", _AGREE_B, 11, _compared_b))
         for n, speed in enumerate(rig_1.COMPARED[spring], first)
-    ),
-    Turns(
-        "8.14",
+    },
+    "8.14": Turns(
         "A",
         SPEEDS["A"][:3],
         "A typical oscillation has four peaks; its amplitude grows up to 290 rpm, half the natural frequency.",
         _fig_8_14,
         _TOGETHER,
     ),
-    Turns(
-        "8.15",
+    "8.15": Turns(
         "A",
         SPEEDS["A"][3:],
         "The amplitude falls up to 345 rpm and then grows. Four peaks become two, until at 500 rpm the motion is like a sine.",
         _fig_8_15,
         _TOGETHER,
     ),
-    Turns(
-        "8.16",
+    "8.16": Turns(
         "B",
         SPEEDS["B"][:3],
         "Each oscillation has four peaks; the amplitude grows up to 580 rpm, half the natural frequency.",
         _fig_8_16,
         _TOGETHER,
     ),
-    Turns(
-        "8.17",
+    "8.17": Turns(
         "B",
         SPEEDS["B"][3:],
         "Beyond 580 rpm the amplitude falls, then grows; the peaks tend to meet as with spring A.",
         _fig_8_17,
         _TOGETHER,
     ),
-    Turns(
-        "8.18",
+    "8.18": Turns(
         "C",
         TYPICAL,
         "The slider of rig 2 moves almost as a sine, with a phase that varies with the speed, from 300 to 1000 rpm.",
@@ -499,7 +458,7 @@ TURNS = (
         "The text names neither the spring nor the speeds of the typical oscillations. We show spring C below, at and above "
         "resonance.",
     ),
-)
+}
 
 #: The studies by number.
-STUDIES = {row.number: row.study for row in TURNS}
+STUDIES = {number: Study(row.compute, row.draw) for number, row in TURNS.items()}

@@ -22,7 +22,6 @@ from .rigs import LOST, amplitude, overtones, turn
 from .series_2 import best_error_ratios, error_ratios, out_of_reach, path_motion, shares_of_stated
 from .stated_errors import share_of_stated
 
-NUMBER = "conclusions"
 #: Longer semi-axes of the ellipses that links move along (cm): those of paths (a) and (b), and one between.
 ELLIPSES = {"path (a), 10 cm": 10.0, "12.5 cm": 12.5, "path (b), 15 cm": 15.0}
 
@@ -169,7 +168,6 @@ def judge_experiment() -> tuple[Statement, ...]:
 def compute() -> StudyResult:
     """Judge the sentences of sections 8.0 and 9.1 that make a claim."""
     return StudyResult(
-        number=NUMBER,
         claim="What the introduction to the experiments says of the theory (8.0), and what the thesis concludes (9.1).",
         assignment=(
             "Sentences that only tell what was done claim nothing and have no verdict: L6045 to 6053, 6067 to 6096, 7005, "
@@ -189,4 +187,4 @@ def compute() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {NUMBER: Study(NUMBER, compute)}
+STUDIES = {"conclusions": Study(compute)}

@@ -40,7 +40,6 @@ from .runs import SPEED as TURN_RPM
 from .runs import steady_turn, table_3_1
 from .series_2 import PATH, ROCKER, linkage_error, mended_path_linkage, path_motion, readings, rocker_motion
 
-NUMBER = "control"
 #: Crank speed (rad/s).
 SPEED = 4.0 * pi
 #: Damping (N.s/m) and friction (N) in the guide.
@@ -220,7 +219,6 @@ def compute() -> StudyResult:
     for name, found_cam in cams.items():
         columns |= {f"cam of {name}; x [cm]": found_cam.curve.real, f"cam of {name}; y [cm]": found_cam.curve.imag}
     return StudyResult(
-        number=NUMBER,
         claim="The slider may be driven off-line, with feedback to a stored motion, or adaptively in trial cycles.",
         assignment="The thesis computes none of them. In our example the links are steel bars of 20 by 5 mm, and a slider "
         f"of {m.model.slider_mass:.1f} kg has a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction. It "
@@ -478,4 +476,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The study by its name.
-STUDIES = {NUMBER: Study(NUMBER, compute, draw)}
+STUDIES = {"control": Study(compute, draw)}

@@ -362,7 +362,6 @@ def compute() -> StudyResult:
             name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
             columns[f"lambda_k^2; {name}"], columns[f"I4; {name}"] = boundary.points.T
     return StudyResult(
-        number="5.4",
         claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
         assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are our choice. The damper that removes the "
         "region is found at I4 = 0.25 to 2 in steps of 0.25.",
@@ -405,4 +404,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The study by its number.
-STUDIES = {"5.4": Study("5.4", compute, draw)}
+STUDIES = {"5.4": Study(compute, draw)}

@@ -260,7 +260,6 @@ def compute() -> StudyResult:
     for label, run in found.items():
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
     return StudyResult(
-        number="3.1",
         claim="The multipliers are the pin forces. If all second derivatives are integrated at constant speed, the closure "
         "of the loop shows the error of the integration.",
         columns=columns,
@@ -519,4 +518,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"3.1": Study("3.1", compute, draw)}
+STUDIES = {"3.1": Study(compute, draw)}

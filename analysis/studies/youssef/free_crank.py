@@ -174,13 +174,12 @@ BOTH = {f"k = {plain(k)} dyn/cm": k for k in (SOFT, STIFF)}
 
 
 def _coast_result(
-    number: str, claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *statements: Statement
+    claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *statements: Statement
 ) -> StudyResult:
     """Build the result of a free motion from its columns, up to the last turn that the figure shows."""
     turns = Turns.from_run(run)
     last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
     return StudyResult(
-        number=number,
         claim=claim,
         assignment=(
             "The text does not say at which crank angle the torque is removed, nor how long the motion is followed. We "
@@ -192,11 +191,10 @@ def _coast_result(
     )
 
 
-def free_speed(number: str, stiffness: float) -> StudyResult:
+def free_speed(stiffness: float) -> StudyResult:
     """Compute the crank speed over the crank angle in free motion."""
     run = coast(stiffness)
     return _coast_result(
-        number,
         "The speed of the free crank oscillates; the oscillation and the mean decrease.",
         run,
         {
@@ -258,11 +256,10 @@ def draw_free_speed(result: StudyResult) -> Figure:
     return plot_curves([panel], title=result.heading)
 
 
-def _phase_plane(number: str, stiffness: float, *statements: Statement) -> StudyResult:
+def _phase_plane(stiffness: float, *statements: Statement) -> StudyResult:
     """Compute the slider's phase plane in free motion."""
     run, label = coast(stiffness), f"k = {plain(stiffness)} dyn/cm"
     return _coast_result(
-        number,
         "The slider tends to u = 0 and u' = 0 with decreasing oscillations, a drift, and higher harmonics.",
         run,
         {
@@ -299,7 +296,6 @@ def soft_phase_plane() -> StudyResult:
         for label, t in turns.items()
     ]
     return _phase_plane(
-        "3.13",
         SOFT,
         Statement(
             "Due to sampling of output data straight-line segments appear on the curves. These segments should in "
@@ -430,7 +426,6 @@ def stiff_phase_plane() -> StudyResult:
     response, twice = (np.abs(1.0 - x**2 + 2j * ratio * x) ** -1 for x in (0.5 * share, share))
     one_mass = half * float(share[(twice / response).argmax()])
     return _phase_plane(
-        "3.14",
         STIFF,
         Statement(
             "However, these non-linearities are more manifested in Fig. (3.14) around the crank angular speed of 27 "
@@ -507,9 +502,9 @@ def draw_phase_plane(result: StudyResult) -> Figure:
 
 
 #: The studies of 3.11 to 3.14.
-STUDIES = (
-    Study("3.11", partial(free_speed, "3.11", SOFT), draw_free_speed),
-    Study("3.12", partial(free_speed, "3.12", STIFF), draw_free_speed),
-    Study("3.13", soft_phase_plane, draw_phase_plane),
-    Study("3.14", stiff_phase_plane, draw_phase_plane),
-)
+STUDIES = {
+    "3.11": Study(partial(free_speed, SOFT), draw_free_speed),
+    "3.12": Study(partial(free_speed, STIFF), draw_free_speed),
+    "3.13": Study(soft_phase_plane, draw_phase_plane),
+    "3.14": Study(stiff_phase_plane, draw_phase_plane),
+}

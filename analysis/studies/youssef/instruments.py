@@ -58,7 +58,6 @@ def compute_pulses() -> StudyResult:
         columns[f"crank speed by the pulses; {inertia:g} kg.m2 [rpm]"] = pulses[inertia] / RAD_S_PER_RPM
     varies = {inertia: float(np.ptp(speed) / speed.mean()) for inertia, speed in speeds.items()}
     return StudyResult(
-        number="8.4",
         claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
         assignment="No moment of inertia of crank and flywheels is printed. We try two, driven by a constant torque, with "
         f"spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
@@ -156,7 +155,6 @@ def compute_decay() -> StudyResult:
             u = CM_PER_METRE * impulse_response(spring, time, friction)
             columns[f"slider position u{name}; rig {number}; spring {spring} [cm]"] = u
     return StudyResult(
-        number="8.6",
         claim=(
             "The disconnected slider is struck, and its oscillation decays; the logarithmic decrement gives the damping "
             "coefficient."
@@ -197,4 +195,4 @@ def draw_decay(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"8.4": Study("8.4", compute_pulses, draw_pulses), "8.6": Study("8.6", compute_decay, draw_decay)}
+STUDIES = {"8.4": Study(compute_pulses, draw_pulses), "8.6": Study(compute_decay, draw_decay)}

@@ -153,16 +153,14 @@ def _spring_runs() -> dict[str, Trajectory]:
 
 
 def _launch_result(
-    number: str, claim: str, runs: Mapping[str, Trajectory], quantity: Quantity, *statements: Statement
+    claim: str, runs: Mapping[str, Trajectory], quantity: Quantity, *statements: Statement
 ) -> StudyResult:
     """Build the result of several launches: a quantity over time, and the times at which their torques end."""
     name, output, factor, unit = quantity
     columns = {TIME: next(iter(runs.values())).time}
     columns |= {f"{name}; {label} [{unit}]": factor * run[output] for label, run in runs.items()}
     columns |= {f"end of the torque; {label} [s]": np.array([run.events[0].time]) for label, run in runs.items()}
-    return StudyResult(
-        number=number, claim=claim, assignment=UNSAID, columns=pad_columns(columns), statements=statements
-    )
+    return StudyResult(claim=claim, assignment=UNSAID, columns=pad_columns(columns), statements=statements)
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
@@ -269,7 +267,6 @@ def launch_speeds() -> StudyResult:
     undamped = {label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}
     rises = {label: run_acceleration(torque) for label, torque in zip(runs, TORQUES)}
     return _launch_result(
-        "3.6",
         "The speed rises linearly until the torque no longer accelerates the crank, then oscillates and decays.",
         runs,
         CRANK_SPEED,
@@ -308,7 +305,6 @@ def torque_over_time() -> StudyResult:
     slope = float(np.mean(np.diff(np.log(TORQUES)) / np.diff(np.log([release_time(torque) for torque in TORQUES]))))
     low, scale = least_torque(), TORQUES[-1]
     return StudyResult(
-        number="3.7",
         claim="T0 is hyperbolic in the time to 1 rad, with the axes as asymptotes.",
         assignment=UNSAID,
         columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": TORQUE_RANGE * time**2},
@@ -363,7 +359,6 @@ def launch_positions() -> StudyResult:
     *lesser, shift = (abs(Turns.from_run(run, 1.0).slider.mean()) for run in runs.values())
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
-        "3.8",
         "The harder the launch, the further the slider moves from its start, and the later it settles into a decay.",
         runs,
         SLIDER,
@@ -413,7 +408,6 @@ def launch_speeds_by_spring() -> StudyResult:
     loads = np.array([np.hypot(run["pin.C.fx"], run["pin.C.fy"]) for run in rises.values()])
     undamped = {label: _launches(1e8, k) for label, k in zip(rises, STIFFNESSES)}
     return _launch_result(
-        "3.9",
         "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
         _spring_runs(),
         CRANK_SPEED,
@@ -458,7 +452,6 @@ def launch_positions_by_spring() -> StudyResult:
     settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
     times = {name: [x.time for x in settlings] for name, settlings in (("springs", settled), ("torques", by_torque))}
     return _launch_result(
-        "3.10",
         "The slider moves alike with all springs while the torque acts. A transient follows, whose duration depends on "
         "spring and torque, and then a steady decay.",
         runs,
@@ -508,10 +501,10 @@ _draw_by_torque = partial(draw_launches, TORQUES, r"$T_0$ [dyn cm]")
 _draw_by_spring = partial(draw_launches, STIFFNESSES, "stiffness k [dyn/cm]")
 
 #: The studies of 3.6 to 3.10.
-STUDIES = (
-    Study("3.6", launch_speeds, _draw_by_torque),
-    Study("3.7", torque_over_time, draw_torque_over_time),
-    Study("3.8", launch_positions, _draw_by_torque),
-    Study("3.9", launch_speeds_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
-    Study("3.10", launch_positions_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
-)
+STUDIES = {
+    "3.6": Study(launch_speeds, _draw_by_torque),
+    "3.7": Study(torque_over_time, draw_torque_over_time),
+    "3.8": Study(launch_positions, _draw_by_torque),
+    "3.9": Study(launch_speeds_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
+    "3.10": Study(launch_positions_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
+}

@@ -251,7 +251,6 @@ def compute() -> StudyResult:
     for i, name in enumerate(("inertia M", "stiffness K", "force F")):
         columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
     return StudyResult(
-        number="4.2",
         claim="Equations (4.1) to (4.35), one by one, each compared with our model or with the equations before it.",
         assignment="The right linear equation is (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F. It is the "
         "equation of the mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta). M, K and F "
@@ -475,4 +474,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"4.2": Study("4.2", compute, draw)}
+STUDIES = {"4.2": Study(compute, draw)}

@@ -19,7 +19,6 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import Study, StudyResult
 from .runs import PERIOD, SPEED, table_3_1
 
-NUMBER = "linkage"
 #: Table 3.1 with P 12 cm from the crank pin and 30 degrees off the coupler.
 MECHANISM = replace(table_3_1(1e6), coupler_point_distance=0.12, coupler_point_angle=radians(30.0))
 TURNS = 3
@@ -37,7 +36,6 @@ def compute() -> StudyResult:
     """Compute the positions of slider and coupler point over the run."""
     t = run()
     return StudyResult(
-        number=NUMBER,
         claim="A five-bar linkage whose rocker pin slides on a sprung and damped guide has two degrees of freedom.",
         assignment="The picture and its coupler point are ours.",
         columns={
@@ -64,7 +62,5 @@ def animate(result: StudyResult, path: Path) -> Path:
     return animate_linkage(MECHANISM, run(), path, frames=72, title=result.heading)
 
 
-STUDY = Study(NUMBER, compute, draw, animate)
-
 #: The study by its name.
-STUDIES = {NUMBER: STUDY}
+STUDIES = {"linkage": Study(compute, draw, animate)}

@@ -159,7 +159,6 @@ def drift_result() -> StudyResult:
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
     columns |= {f"slider position u; {_mu(mu)} [cm]": run.until_collinear for mu, run in runs.items()}
     return StudyResult(
-        number="3.2",
         claim="Without a spring the slider has a transient of two turns, then a steady motion about a linear drift. The "
         "weaker the damper, the sooner the links become collinear.",
         columns=pad_columns(columns),
@@ -220,7 +219,6 @@ def weightless_result() -> StudyResult:
         columns[f"slider position u without gravity; {_mu(mu)} [cm]"] = drift(mu, 0.0).until_collinear
     ratios = {mu: drift(mu, 0.0).rate / drift(mu).rate for mu in NEAR_LINEAR}
     return StudyResult(
-        number="3.3",
         claim="Without gravity the rate M of the drift is slightly reduced.",
         columns=pad_columns(columns),
         statements=(
@@ -272,7 +270,7 @@ def draw_drift(result: StudyResult) -> Figure:
 
 
 #: The studies of 3.2 and 3.3.
-STUDIES = (
-    Study("3.2", drift_result, draw_drift, sweeps=("slider.damping",)),
-    Study("3.3", weightless_result, draw_drift, sweeps=("slider.damping", "gravity")),
-)
+STUDIES = {
+    "3.2": Study(drift_result, draw_drift, sweeps=("slider.damping",)),
+    "3.3": Study(weightless_result, draw_drift, sweeps=("slider.damping", "gravity")),
+}

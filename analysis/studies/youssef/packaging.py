@@ -21,7 +21,6 @@ from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import FOUND, PRINTED, TARGET, FloatArray, best, curves_panel, linkages_panel, path_columns, shape_curve
 from .problems import PACKAGING_OFFSET_CM, PACKAGING_ROTATION, PROBLEMS, N
 
-NUMBER = "6.11"
 #: Travel AB between the program's points (10, 0) and (164, 0) (cm).
 TRAVEL_CM = 154.0
 
@@ -66,7 +65,6 @@ def compute() -> StudyResult:
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * points[:, k] for k, axis in enumerate("xy")}
     line, above = PACKAGING_OFFSET_CM[1], CM_PER_METRE * p.linkage.pivot_y
     return StudyResult(
-        number=NUMBER,
         claim=(
             "A four-bar pushes packages along a straight line within 120 degrees of crank rotation and returns within a "
             "region: nineteen desired points, 72 actual ones."
@@ -146,4 +144,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The study by its number.
-STUDIES = {NUMBER: Study(NUMBER, compute, draw)}
+STUDIES = {"6.11": Study(compute, draw)}

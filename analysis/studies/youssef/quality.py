@@ -29,7 +29,6 @@ from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best
 from .problems import AREA_N, CM2_PER_M2, PROBLEMS
 from .stated_errors import printed_error
 
-NUMBER = "quality"
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
 LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
 #: Evaluations of a simplex, number of its runs, and its size relative to the dimensions.
@@ -163,7 +162,6 @@ def compute() -> StudyResult:
         f"{name} {what} [cm2]": [getattr(value, what)] for name, value in q.items() for what in ("timed", "area")
     }
     return StudyResult(
-        number=NUMBER,
         claim="The quality functions of function and path generation may be combined into one. The example is ellipse (a).",
         assignment="The thesis gives no example. Problem, equal weights and the limit of the links are our choice.",
         columns=pad_columns(columns),
@@ -269,4 +267,4 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The study by its name.
-STUDIES = {NUMBER: Study(NUMBER, compute, draw)}
+STUDIES = {"quality": Study(compute, draw)}

@@ -73,7 +73,6 @@ def compute_rig_1() -> StudyResult:
     accommodated = {s: accommodated_amplitude(s) for s in "AB"}
     at, most = accommodated["B"]
     return StudyResult(
-        number="rig-1-resonance",
         claim="With spring A there is one motion at each speed. With spring B the resonance curve leans over, and below its "
         "peak two stable motions exist at the same speed.",
         columns=pad_columns(columns),
@@ -229,7 +228,6 @@ def compute_friction() -> StudyResult:
     columns["crank angle [deg]"] = np.linspace(0.0, 360.0, len(slider(turn("A", SHOWN["A"]))))
     ends = slight_coefficients()
     return StudyResult(
-        number="rig-1-friction",
         claim="Friction in proportion to the guide's force lowers the amplitude slightly and hardly shifts the motion.",
         assignment=(
             "The text gives no coefficient and no measured amplitude. With spring A at 390, 420 and 450 rpm, coefficients "
@@ -350,6 +348,6 @@ def draw_friction(result: StudyResult) -> Figure:
 
 #: The studies by their names.
 STUDIES = {
-    "rig-1-resonance": Study("rig-1-resonance", compute_rig_1, draw_rig_1),
-    "rig-1-friction": Study("rig-1-friction", compute_friction, draw_friction),
+    "rig-1-resonance": Study(compute_rig_1, draw_rig_1),
+    "rig-1-friction": Study(compute_friction, draw_friction),
 }

@@ -182,7 +182,7 @@ def length(spring: str) -> float:
     return CM_PER_METRE * rigs.rig(spring).rocker_length
 
 
-def compute_resonance(number: str, spring: str) -> StudyResult:
+def compute_resonance(spring: str) -> StudyResult:
     """Compute the amplitude over the speed by the full equations and by two harmonics of the linear equation."""
     (branch,), l4 = rigs.motions(spring).branches, length(spring)
     place, _ = rigs.maximum_near_fraction(spring, 1)
@@ -194,7 +194,6 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
         "amplitude over l4; linear equation [1]": [linear_motion(spring, speed).amplitude for speed in speeds],
     }
     return StudyResult(
-        number=number,
         claim=f"Theory and experiment agree up to resonance, {NATURAL[spring][0]} rpm; beyond it theory is smaller.",
         columns=pad_columns(columns),
         statements=(*_beyond_resonance(), *_natural_frequencies()) if spring == "C" else (),
@@ -419,7 +418,6 @@ def compute_harmonics() -> StudyResult:
             [linear_motion(spring, speed).harmonic(2) for speed in points.tolist()]
         )
     return StudyResult(
-        number="8.21",
         claim="The second harmonic is smaller than the first by a factor of 50.",
         columns=pad_columns(columns),
         statements=(
@@ -513,7 +511,6 @@ def compute_forces() -> StudyResult:
         for pin in PINS:
             columns[f"greatest force in pin {pin}; {name} [N]"] = table[f"greatest force in pin {pin} [N]"]
     return StudyResult(
-        number="rig-2-forces",
         claim="At low speed every force of this horizontal machine grows with the square of the speed. Resonance increases "
         "the force in pin D most.",
         columns=pad_columns(columns),
@@ -563,8 +560,8 @@ def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: st
 
 #: The studies by number and name.
 STUDIES = {
-    "8.19": Study("8.19", partial(compute_resonance, "8.19", "C"), partial(draw_resonance, "C")),
-    "8.20": Study("8.20", partial(compute_resonance, "8.20", "D"), partial(draw_resonance, "D")),
-    "8.21": Study("8.21", compute_harmonics, draw_harmonics),
-    "rig-2-forces": Study("rig-2-forces", compute_forces, draw_forces),
+    "8.19": Study(partial(compute_resonance, "C"), partial(draw_resonance, "C")),
+    "8.20": Study(partial(compute_resonance, "D"), partial(draw_resonance, "D")),
+    "8.21": Study(compute_harmonics, draw_harmonics),
+    "rig-2-forces": Study(compute_forces, draw_forces),
 }

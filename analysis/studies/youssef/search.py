@@ -262,7 +262,6 @@ def compute() -> StudyResult:
     columns |= {f"error; {name} [cm2]": np.sort([end.error for end in ends]) for name, ends in found.items()}
     columns["least error [cm2]"] = np.full(SEARCHES, our_error(PROBLEM))
     return StudyResult(
-        number="6.2",
         claim=(
             "The simplex starts from sets of random parameters within their bounds, and is repeated with the results among "
             "its sets."
@@ -509,7 +508,6 @@ def compute_closures() -> StudyResult:
     for name, xy in shapes.items():
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * np.append(xy[:, k], xy[0, k]) for k, axis in enumerate("xy")}
     return StudyResult(
-        number="6.3",
         claim=(
             "The area between curves is that of the triangles between their points. Of the two closures the better is taken."
         ),
@@ -599,4 +597,4 @@ def draw_closures(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"6.2": Study("6.2", compute, draw), "6.3": Study("6.3", compute_closures, draw_closures)}
+STUDIES = {"6.2": Study(compute, draw), "6.3": Study(compute_closures, draw_closures)}

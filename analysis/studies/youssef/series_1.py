@@ -131,7 +131,6 @@ def curve_wanted() -> StudyResult:
         columns |= xy(f"U = {u:g}", coupler_point(TURN, u - 1.0))
     assert reached.all()
     return StudyResult(
-        number="7.4",
         claim="The desired curve is given by numbers, depends on time, and lies within the family of Fig 7.2.",
         assignment=(
             "The curve is lost. Ours consists of the places of P at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad "
@@ -187,7 +186,6 @@ def two_positions() -> StudyResult:
     for name, end in zip(("U1", "U2"), u[k]):
         columns |= xy(name, np.array([joint, end + 0j]))
     return StudyResult(
-        number="7.5",
         claim=(
             "The coupler points at the desired point, with the rocker in either of two positions; otherwise the rocker is "
             "upright."
@@ -483,7 +481,6 @@ def compute(number: str) -> StudyResult:
     """Compute the slider motions of a figure."""
     row = TABLE[number]
     return StudyResult(
-        number=number,
         claim=row.claim,
         assignment=row.assignment,
         columns=columns_of_motions(),
@@ -494,9 +491,9 @@ def compute(number: str) -> StudyResult:
 
 #: The studies by number.
 STUDIES = {
-    "7.4": Study("7.4", curve_wanted, draw_wanted),
-    "7.5": Study("7.5", two_positions, draw_positions),
+    "7.4": Study(curve_wanted, draw_wanted),
+    "7.5": Study(two_positions, draw_positions),
 } | {
-    number: Study(number, partial(compute, number), partial(draw_motions, names=row.names, what=row.what))
+    number: Study(partial(compute, number), partial(draw_motions, names=row.names, what=row.what))
     for number, row in TABLE.items()
 }

@@ -192,7 +192,6 @@ def moved_rocker() -> StudyResult:
         columns[f"error; {n} [deg]"] = angle_error(solution.linkage)
         columns[f"angle; {n} [deg]"] = wanted_angle() + columns[f"error; {n} [deg]"]
     return StudyResult(
-        number="7.11",
         claim="The slider, moved by two harmonics, reduces the weighted error of the rocker function from 35.0 to 4.8 deg2.",
         assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
         "are taken.",
@@ -385,7 +384,6 @@ def moved_path() -> StudyResult:
         if linkage.pivot is not None:
             columns[f"{name} slider [cm]"] = CM_PER_METRE * slider(linkage).series(TURN)
     return StudyResult(
-        number="7.12",
         claim="The slider, moved by two harmonics, reduces the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=pad_columns(columns),
         statements=_path(),
@@ -488,4 +486,4 @@ def draw_path(result: StudyResult) -> Figure:
 
 
 #: The studies by number.
-STUDIES = {"7.11": Study("7.11", moved_rocker, draw_rocker), "7.12": Study("7.12", moved_path, draw_path)}
+STUDIES = {"7.11": Study(moved_rocker, draw_rocker), "7.12": Study(moved_path, draw_path)}
