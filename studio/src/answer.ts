@@ -3,11 +3,11 @@
 import { look, makePlot } from "./charts";
 import { button, line, make } from "./elements";
 import { save } from "./exports";
+import { element, written } from "./picture";
 import type { Answer, File, Small } from "./server";
-import type { Point } from "./view";
+import { cornersOf, type Point } from "./view";
 import { plainly } from "./words";
 
-const SPACE = "http://www.w3.org/2000/svg";
 /** Of a small picture, in px. */
 const [WIDTH, HEIGHT, EDGE] = [120, 76, 5];
 
@@ -18,29 +18,25 @@ export function fileButton({ name, base64 }: File): HTMLButtonElement {
 
 /** A linkage in the plane of its path, with the path that was wanted. */
 export function smallPicture({ links, curves }: Small, wanted: Point[], closed: boolean): SVGSVGElement {
-  const svg = document.createElementNS(SPACE, "svg");
-  const all = [...links, ...curves, wanted].flat();
-  const [low, high] = [Math.min, Math.max].map((end) => [0, 1].map((d) => end(...all.map((p) => p[d]))));
+  const svg = element("svg", document.createDocumentFragment(), {
+    viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+    class: "small",
+    "aria-hidden": "true",
+  });
+  const [low, high] = cornersOf([...links, ...curves, wanted].flat());
   const scale = Math.min(
     (WIDTH - 2 * EDGE) / (high[0] - low[0] || 1),
     (HEIGHT - 2 * EDGE) / (high[1] - low[1] || 1),
   );
-  const place = ([x, y]: Point): string =>
-    [x - (low[0] + high[0]) / 2, (low[1] + high[1]) / 2 - y]
-      .map((v, d) => (v * scale + [WIDTH, HEIGHT][d] / 2).toFixed(1))
-      .join(",");
-  const draw = (points: Point[], name: string): void => {
-    const made = document.createElementNS(SPACE, "polyline");
-    made.setAttribute("points", points.map(place).join(" "));
-    made.setAttribute("class", name);
-    svg.append(made);
-  };
+  const place = ([x, y]: Point): Point => [
+    WIDTH / 2 + scale * (x - (low[0] + high[0]) / 2),
+    HEIGHT / 2 - scale * (y - (low[1] + high[1]) / 2),
+  ];
+  const draw = (points: Point[], name: string): void =>
+    void element("polyline", svg, { class: name, points: written(points.map(place)) });
   draw(closed ? [...wanted, wanted[0]] : wanted, "wanted");
   for (const curve of curves) draw(curve, "beside");
   for (const link of links) draw(link, "bar");
-  svg.setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
-  svg.setAttribute("class", "small");
-  svg.setAttribute("aria-hidden", "true");
   return svg;
 }
 

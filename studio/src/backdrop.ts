@@ -1,9 +1,10 @@
 /** A photo or a drawing behind the mechanism: it never leaves the machine, only where it lies is kept. */
 
 import { readLines } from "./dxf";
+import { button, make } from "./elements";
 import { element } from "./picture";
 import type { Placement } from "./tables";
-import type { Point, View } from "./view";
+import { arrowOf, cornersOf, type Point, type View } from "./view";
 import { digits } from "./words";
 
 interface Field {
@@ -20,12 +21,6 @@ const FIELDS: Field[] = [
   { key: "width", label: "width", unit: "mm", factor: 1e3, step: 1 },
   { key: "angle", label: "turned", unit: "deg", factor: 180 / Math.PI, step: 1 },
 ];
-const ARROWS: Record<string, Point> = {
-  ArrowLeft: [-1, 0],
-  ArrowRight: [1, 0],
-  ArrowUp: [0, 1],
-  ArrowDown: [0, -1],
-};
 
 export interface BackdropListener {
   /** The picture lies elsewhere; `done` when that is to be undone as one step. */
@@ -43,8 +38,13 @@ export class Backdrop {
     [0, 0],
     [0, 0],
   ];
-  private readonly box = document.createElement("details");
-  private readonly inside = document.createElement("div");
+  private readonly inside = make("div");
+  private readonly box = make(
+    "details",
+    {},
+    make("summary", { textContent: "Photo or drawing behind" }),
+    this.inside,
+  );
   private readonly fields = new Map<string, HTMLInputElement>();
   private readonly marks: SVGGElement[] = [];
   private readonly line: SVGPolylineElement;
@@ -135,23 +135,13 @@ export class Backdrop {
     this.clear();
     this.address = address;
     this.ratio = image.naturalHeight / image.naturalWidth || 1;
-    const frame = { x: -0.5, y: -this.ratio / 2, width: 1, height: this.ratio };
-    element("image", this.group, { ...frame, href: address, preserveAspectRatio: "none" });
+    element("image", this.group, { ...this.frame, href: address, preserveAspectRatio: "none" });
     this.begin(this.view.centre, Math.min(this.view.extent[0], this.view.extent[1] / this.ratio));
   }
 
   private lines(text: string): void {
     const { paths, left } = readLines(text);
-    const [low, high]: Point[] = [
-      [Infinity, Infinity],
-      [-Infinity, -Infinity],
-    ];
-    for (const path of paths)
-      for (const point of path)
-        for (const n of [0, 1]) {
-          low[n] = Math.min(low[n], point[n]);
-          high[n] = Math.max(high[n], point[n]);
-        }
+    const [low, high] = cornersOf(paths.flat());
     const width = high[0] - low[0] || high[1] - low[1];
     if (!(width > 0)) throw new Error("all its lines are at one point");
     this.clear();
@@ -160,16 +150,18 @@ export class Backdrop {
     const drawn = paths.map((path) =>
       path.map(([x, y]) => `${(x - middle[0]) / width} ${(middle[1] - y) / width}`).join("L"),
     );
-    const frame = { x: -0.5, y: -this.ratio / 2, width: 1, height: this.ratio };
-    element("rect", this.group, frame);
-    element("path", this.group, {
-      d: drawn.map((one) => `M${one}`).join(""),
-      "vector-effect": "non-scaling-stroke",
-    });
+    element("rect", this.group, this.frame);
+    const d = drawn.map((one) => `M${one}`).join("");
+    element("path", this.group, { d, "vector-effect": "non-scaling-stroke" });
     // a drawing says itself how large it is, and where it lies
     this.begin(middle, width);
     const kinds = Object.entries(left).map(([kind, count]) => `${count} ${kind}`);
     if (kinds.length > 0) this.listener.fault(`left out of the drawing: ${kinds.join(", ")}`);
+  }
+
+  /** What is shown, of a width of 1 about the origin. */
+  private get frame(): Record<string, number> {
+    return { x: -0.5, y: -this.ratio / 2, width: 1, height: this.ratio };
   }
 
   private clear(): void {
@@ -187,12 +179,6 @@ export class Backdrop {
       [now.x + reach, now.y],
     ];
     this.put(now, true);
-  }
-
-  private remove(): void {
-    this.clear();
-    this.ratio = 0;
-    this.draw();
   }
 
   private distance(): number {
@@ -214,12 +200,10 @@ export class Backdrop {
 
   /** One of the two points, to be dragged or moved by the arrow keys. */
   private mark(number: number): SVGGElement {
-    const mark = element("g", this.markers, { tabindex: 0, role: "button" });
-    mark.setAttribute(
-      "aria-label",
-      `point ${number + 1} of a known distance: drag it, or move it with the arrow keys`,
-    );
-    element("title", mark).textContent = `point ${number + 1} of a known distance`;
+    const name = `point ${number + 1} of a known distance`;
+    const label = `${name}: drag it, or move it with the arrow keys`;
+    const mark = element("g", this.markers, { tabindex: 0, role: "button", "aria-label": label });
+    element("title", mark).textContent = name;
     element("circle", mark, { r: 12 });
     element("polyline", mark, { points: "-12,0 12,0" });
     element("polyline", mark, { points: "0,-12 0,12" });
@@ -230,10 +214,8 @@ export class Backdrop {
     };
     this.dragged(mark, move);
     mark.addEventListener("keydown", (event) => {
-      const way = ARROWS[event.key];
+      const way = arrowOf(event);
       if (!way) return;
-      event.preventDefault();
-      event.stopPropagation();
       const step = (event.shiftKey ? 20 : 1) / this.view.scale;
       move([way[0] * step, way[1] * step]);
     });
@@ -265,21 +247,14 @@ export class Backdrop {
   // Its fields
 
   private input(type: string, key: string, label: string, unit = ""): HTMLInputElement {
-    const line = document.createElement("label");
-    line.textContent = `${label} `;
-    const field = document.createElement("input");
-    field.type = type;
+    const field = make("input", { type });
     this.fields.set(key, field);
-    line.append(field, unit);
-    if (key !== "file") line.className = "placed";
-    this.inside.append(line);
+    const className = key === "file" ? "" : "placed";
+    this.inside.append(make("label", { className }, `${label} `, field, unit));
     return field;
   }
 
   private form(): void {
-    const head = document.createElement("summary");
-    head.textContent = "Photo or drawing behind";
-    this.box.append(head, this.inside);
     this.place.append(this.box);
     const file = this.input(
       "file",
@@ -316,10 +291,12 @@ export class Backdrop {
     locked.addEventListener("change", () => {
       if (this.placement) this.put({ ...this.placement, locked: locked.checked }, true);
     });
-    const away = document.createElement("button");
-    away.textContent = "Take it away";
+    const away = button("Take it away", () => {
+      this.clear();
+      this.ratio = 0;
+      this.draw();
+    });
     away.className = "placed";
-    away.addEventListener("click", () => this.remove());
     this.inside.append(away);
     addEventListener("dragover", (event) => {
       if (event.dataTransfer?.types.includes("Files")) event.preventDefault();

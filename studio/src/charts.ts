@@ -2,6 +2,7 @@
 
 import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
+import { make } from "./elements";
 import type { Rows } from "./motions";
 import {
   type Chart as Table,
@@ -42,15 +43,6 @@ function sample({ stroke, dash, width }: Look): string {
   return `url("data:image/svg+xml,${encodeURIComponent(drawing)}") no-repeat`;
 }
 
-/** The name of a curve in the legend: a click shows and hides the curve, which uPlot hears of. */
-function legendSwitch({ label }: Look): HTMLElement {
-  const made = document.createElement("button");
-  made.textContent = label;
-  made.title = "Show or hide this curve";
-  made.setAttribute("aria-pressed", "true");
-  return made;
-}
-
 /** Curves over an axis with a name and a unit, in the colours of the page; without data yet. */
 export function makePlot(
   place: HTMLElement,
@@ -58,7 +50,11 @@ export function makePlot(
   looks: Look[],
   options: Partial<uPlot.Options>,
 ): uPlot {
-  const switches = looks.map(legendSwitch);
+  // a click on a name in the legend shows and hides its curve, which uPlot hears of
+  const title = "Show or hide this curve";
+  const switches = looks.map(({ label }) =>
+    make("button", { textContent: label, title, "aria-pressed": "true" }),
+  );
   const pressed = (plot: uPlot, n: number | null): void =>
     void (n && switches[n - 1].setAttribute("aria-pressed", String(plot.series[n].show)));
   const stroke = colour("text");
@@ -115,9 +111,7 @@ export class Charts {
   private wanted: (chart: Table) => boolean = () => true;
 
   constructor(private readonly place: HTMLElement) {
-    const style = document.createElement("style");
-    style.textContent = uplotStyle;
-    document.head.append(style);
+    document.head.append(make("style", { textContent: uplotStyle }));
     new ResizeObserver(() => {
       for (const { plot } of this.charts) plot.setSize({ width: this.width(), height: HEIGHT });
     }).observe(place);
@@ -136,18 +130,15 @@ export class Charts {
     this.place.replaceChildren();
     const axis = source === "steady" ? "crank angle [deg]" : "time [s]";
     this.charts = mechanism.charts.filter(wanted).map(({ title, unit, factor, curves }) => {
-      const box = document.createElement("figure");
-      const caption = document.createElement("figcaption");
-      caption.textContent = `${title} [${unit}]`;
-      box.setAttribute("aria-label", `${title} in ${unit}: ${curves.map(called).join(", ")}`);
-      box.append(caption);
+      const label = `${title} in ${unit}: ${curves.map(called).join(", ")}`;
+      const caption = make("figcaption", { textContent: `${title} [${unit}]` });
+      const box = make("figure", { "aria-label": label }, caption);
       this.place.append(box);
       const looks = curves.map((curve, n) => look(called(curve), n));
       // its scale is known when it is drawn
       const hooks = { draw: [() => this.mark(this.row)] };
       const plot = makePlot(box, axis, looks, { width: this.width(), hooks });
-      const line = document.createElement("div");
-      line.className = "now";
+      const line = make("div", { className: "now" });
       plot.over.append(line);
       return { plot, line, curves, unit, factor };
     });

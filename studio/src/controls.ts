@@ -1,5 +1,6 @@
 /** Buttons, lists and keys about the mechanism: what they do is told by who makes them. */
 
+import { make } from "./elements";
 import type { Playback } from "./playback";
 import { type Source, type State, type Tables, givenValue } from "./tables";
 import { digits, multiplierInWords, verdictInWords } from "./words";
@@ -72,9 +73,8 @@ export class Controls {
     this.sets.add(new Option("values of its own", ""));
     for (const m of this.tables.mechanisms)
       for (const { name, source } of m.sets) {
-        const option = new Option(`${m.title}: ${name}`, `${m.name}/${name}`);
-        option.title = source;
-        this.sets.add(option);
+        const text = `${m.title}: ${name}`;
+        this.sets.add(make("option", { text, value: `${m.name}/${name}`, title: source }));
       }
     this.sets.addEventListener("change", () => {
       const [mechanism, name] = this.sets.value.split("/");
@@ -101,10 +101,8 @@ export class Controls {
     this.source.value = source;
     const verdict = orbit.found ? verdictInWords(orbit, this.tables.tolerance) : "none found";
     const place = by<HTMLElement>("floquet");
-    const word = document.createElement("b");
-    word.textContent = verdict;
-    word.classList.toggle("unstable", verdict === "unstable" || !orbit.found);
-    place.replaceChildren("Periodic motion: ", word);
+    const className = verdict === "unstable" || !orbit.found ? "unstable" : "";
+    place.replaceChildren("Periodic motion: ", make("b", { textContent: verdict, className }));
     if (orbit.size > 0)
       place.append(`; Floquet multipliers ${orbit.multipliers.map(multiplierInWords).join(", ")}`);
     place.title = `computed in ${digits(milliseconds, 2)} ms`;

@@ -2,12 +2,18 @@
 
 export type Child = Node | string;
 
+/** Attributes that some browsers do not have as properties. */
+type Spoken = { role?: string } & Record<`aria-${string}`, string>;
+
 export function make<K extends keyof HTMLElementTagNameMap>(
   kind: K,
-  properties: Partial<HTMLElementTagNameMap[K]> = {},
+  properties: Partial<HTMLElementTagNameMap[K]> & Spoken = {},
   ...children: Child[]
 ): HTMLElementTagNameMap[K] {
-  const made = Object.assign(document.createElement(kind), properties);
+  const made = document.createElement(kind);
+  for (const [name, value] of Object.entries(properties))
+    if (/^role$|^aria-/.test(name)) made.setAttribute(name, value as string);
+    else Object.assign(made, { [name]: value });
   made.append(...children);
   return made;
 }

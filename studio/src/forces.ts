@@ -1,5 +1,6 @@
 /** The force in a joint as a vector over the motion, with the envelope of all of them. */
 
+import { make } from "./elements";
 import type { Rows } from "./motions";
 import { hull } from "./hull";
 import { type Interval, Plane } from "./plane";
@@ -9,10 +10,10 @@ import { called, digits } from "./words";
 const HEIGHT = 300;
 
 export class Forces {
-  readonly box = document.createElement("figure");
-  private readonly joint = document.createElement("select");
-  private readonly sides = document.createElement("select");
-  private readonly words = document.createElement("div");
+  readonly box = make("figure");
+  private readonly joint = make("select", { "aria-label": "Joint" });
+  private readonly sides = make("select", { "aria-label": "Seen along" });
+  private readonly words = make("div", { className: "told" });
   private readonly plane: Plane;
   private mechanism!: Mechanism;
   private chart: Chart | undefined;
@@ -20,17 +21,11 @@ export class Forces {
   private row = 0;
 
   constructor() {
-    const line = document.createElement("div");
-    line.className = "axes";
-    this.joint.setAttribute("aria-label", "Joint");
-    this.sides.setAttribute("aria-label", "Seen along");
     for (const select of [this.joint, this.sides]) select.addEventListener("change", () => this.draw());
-    line.append("Force on ", this.joint, this.sides);
-    this.box.append(line);
+    this.box.append(make("div", { className: "axes" }, "Force on ", this.joint, this.sides));
     this.plane = new Plane(this.box, HEIGHT);
     this.plane.canvas.setAttribute("role", "img");
     this.plane.onSize = () => this.draw();
-    this.words.className = "told";
     this.box.append(this.words);
   }
 

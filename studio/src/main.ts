@@ -1,6 +1,7 @@
 /** The studio: a state, what follows from it, and the parts of the page that show both. */
 
 import { Backdrop } from "./backdrop";
+import { Solver } from "./background";
 import { by, Controls } from "./controls";
 import { moduleBytes, Core } from "./core";
 import type { Rows } from "./motions";
@@ -12,7 +13,6 @@ import { Panel } from "./panel";
 import { Picture } from "./picture";
 import { Playback } from "./playback";
 import { WithPython } from "./python";
-import { Solver } from "./solver";
 import {
   type Given,
   allGiven,
@@ -74,10 +74,10 @@ class Studio {
     },
   });
   private embed!: Embed;
-  private readonly solver = new Solver({
-    answered: (answer, newest) => this.answered(answer, newest),
-    failed: (sentence) => this.fault(capital(sentence)),
-  });
+  private readonly solver = new Solver(
+    (answer, newest) => this.answered(answer, newest),
+    (sentence) => this.fault(capital(sentence)),
+  );
   private readonly python = new WithPython(by<HTMLElement>("python"), this.view, {
     state: () => ({ ...this.state, duration: this.duration() }),
     take: (state) => this.take(state),

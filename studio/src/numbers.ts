@@ -1,20 +1,19 @@
 /** All outputs at the instant that is drawn, as a table. */
 
+import { make } from "./elements";
 import { type Mechanism, outputPlace, type Source } from "./tables";
 import { shown } from "./words";
 
 export class Numbers {
-  private readonly box = document.createElement("details");
-  private readonly table = document.createElement("table");
+  private readonly table = make("table");
+  private readonly box = make(
+    "details",
+    { id: "numbers" },
+    make("summary", { textContent: "Numbers at this instant" }),
+    this.table,
+  );
   private cells: HTMLTableCellElement[] = [];
   private mechanism!: Mechanism;
-
-  constructor() {
-    const head = document.createElement("summary");
-    head.textContent = "Numbers at this instant";
-    this.box.append(head, this.table);
-    this.box.id = "numbers";
-  }
 
   show(mechanism: Mechanism, place: HTMLElement): void {
     this.mechanism = mechanism;

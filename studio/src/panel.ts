@@ -1,5 +1,6 @@
 /** Sliders and fields of all that is given, by section. */
 
+import { make } from "./elements";
 import { type Given, type Mechanism, type Values, givenValue } from "./tables";
 import { called, digits } from "./words";
 
@@ -52,12 +53,11 @@ export class Panel {
     const sections = [...new Set(mechanism.given.map((g) => g.section))];
     sections.sort((a, b) => ORDER.indexOf(a) - ORDER.indexOf(b));
     for (const name of sections) {
-      const box = document.createElement("details");
-      box.open = OPEN.includes(name);
-      const head = document.createElement("summary");
-      head.textContent = name;
-      box.append(head);
-      if (name === LOCKABLE) box.append(this.heading());
+      const open = OPEN.includes(name);
+      const box = make("details", { open }, make("summary", { textContent: name }));
+      // over the boxes that lock a dimension
+      const lock = make("span", { className: "heading", textContent: "lock", title: KEPT });
+      if (name === LOCKABLE) box.append(make("div", { className: "row" }, lock));
       for (const given of mechanism.given.filter((g) => g.section === name))
         box.append(this.row(given, givenValue(given, values), locks.includes(given.name)));
       this.place.append(box);
@@ -87,35 +87,18 @@ export class Panel {
       }
   }
 
-  /** Over the boxes that lock a dimension. */
-  private heading(): HTMLElement {
-    const line = document.createElement("div");
-    line.className = "row";
-    const words = document.createElement("span");
-    words.className = "heading";
-    words.textContent = "lock";
-    words.title = KEPT;
-    line.append(words);
-    return line;
-  }
-
   private row(given: Given, value: number, locked: boolean): HTMLElement {
-    const line = document.createElement("div");
-    line.className = "row";
-    const label = document.createElement("label");
-    label.textContent = called(given);
-    label.title = given.text;
-    label.htmlFor = `field ${given.name}`;
-    line.append(label);
+    const htmlFor = `field ${given.name}`;
+    const label = make("label", { textContent: called(given), title: given.text, htmlFor });
+    const line = make("div", { className: "row" }, label);
     if (given.choices) this.choice(line, given, value);
     else this.number(line, given, value, locked);
     return line;
   }
 
   private choice(line: HTMLElement, given: Given, value: number): void {
-    const select = document.createElement("select");
-    select.id = `field ${given.name}`;
-    for (const [key, words] of Object.entries(given.choices!)) select.add(new Option(words, key));
+    const options = Object.entries(given.choices!).map(([key, words]) => new Option(words, key));
+    const select = make("select", { id: `field ${given.name}` }, ...options);
     select.value = String(value);
     select.addEventListener("change", () => this.listener.change(given.name, Number(select.value), true));
     line.append(select);
@@ -123,17 +106,10 @@ export class Panel {
   }
 
   private number(line: HTMLElement, given: Given, value: number, locked: boolean): void {
-    const [slider, field] = [document.createElement("input"), document.createElement("input")];
-    slider.type = "range";
-    slider.step = "any";
-    slider.setAttribute("aria-label", `${called(given)}, slider`);
-    field.type = "number";
-    field.step = "any";
-    field.id = `field ${given.name}`;
-    field.title = given.text;
-    const unit = document.createElement("span");
-    unit.className = "unit";
-    unit.textContent = given.unit;
+    const slider = make("input", { type: "range", step: "any", "aria-label": `${called(given)}, slider` });
+    const id = `field ${given.name}`;
+    const field = make("input", { type: "number", step: "any", id, title: given.text });
+    const unit = make("span", { className: "unit", textContent: given.unit });
     let current = Number.NaN;
     const update = (now: number, all = false): void => {
       if (now === current && !all) return;
@@ -165,12 +141,9 @@ export class Panel {
   }
 
   private locker(given: Given, locked: boolean): HTMLElement {
-    const lock = document.createElement("input");
+    const name = `${called(given)}: lock. ${KEPT}`;
+    const lock = make("input", { type: "checkbox", checked: locked, title: KEPT, "aria-label": name });
     this.locks.set(given.name, lock);
-    lock.type = "checkbox";
-    lock.checked = locked;
-    lock.title = KEPT;
-    lock.setAttribute("aria-label", `${called(given)}: lock. ${KEPT}`);
     lock.addEventListener("change", () => this.listener.lock(given.name, lock.checked));
     return lock;
   }

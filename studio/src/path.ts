@@ -29,9 +29,12 @@ function drawing(form: PathForm): { rows: Child[]; target: () => object } {
   const draw = button("Draw a path on the picture", () => sketch.listen(!sketch.listening));
   draw.setAttribute("aria-pressed", "false");
   const [closed, isClosed] = tick("closed", true);
-  const points = make("textarea", { rows: 6, spellcheck: false });
-  points.placeholder = "x and y of a point in mm, a line each";
-  points.setAttribute("aria-label", "Points of the path: x and y in mm, a line each");
+  const points = make("textarea", {
+    rows: 6,
+    spellcheck: false,
+    placeholder: "x and y of a point in mm, a line each",
+    "aria-label": "Points of the path: x and y in mm, a line each",
+  });
   sketch.onDrawing = (drawing) => {
     draw.setAttribute("aria-pressed", String(drawing));
     svg.classList.toggle("drawing", drawing);

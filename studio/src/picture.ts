@@ -1,7 +1,7 @@
 /** The drawing of a mechanism, by its table of parts; joints are places in a row. */
 
 import { type Joint, jointPlace, type Mechanism, type Part, rowLength } from "./tables";
-import { type Point, View } from "./view";
+import { arrowOf, cornersOf, type Point, View } from "./view";
 
 type Attributes = Record<string, string | number>;
 
@@ -20,16 +20,20 @@ const LETTERS: Point[] = [
 
 export function element<K extends keyof SVGElementTagNameMap>(
   kind: K,
-  parent: Element,
+  parent: ParentNode,
   attributes: Attributes = {},
 ): SVGElementTagNameMap[K] {
   const made = document.createElementNS(SPACE, kind);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  put(made, attributes);
   parent.append(made);
   return made;
 }
 
-const written = (points: Point[]): string =>
+function put(made: Element, attributes: Attributes): void {
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+}
+
+export const written = (points: Point[]): string =>
   points.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}`).join(" ");
 
 /** A point so far along the direction from a to b, and so far to its left on the screen. */
@@ -107,12 +111,8 @@ export class Picture {
       element("title", group).textContent = part.text;
       const drawn: SVGElement[] = [];
       if (part.kind === "link" && part.joints.length > 2) drawn.push(element("polygon", group));
-      const lines = { pivot: 1, link: 0, guide: 1, slider: 0, spring: 1, damper: 2, axis: 1, gear: 1 }[
-        part.kind
-      ];
-      for (let i = 0; i < lines; i++) drawn.push(element("polyline", group));
-      if (part.kind === "link") drawn.push(element("polyline", group));
-      if (part.kind === "slider") drawn.push(element("polygon", group));
+      drawn.push(element(part.kind === "slider" ? "polygon" : "polyline", group));
+      if (part.kind === "damper") drawn.push(element("polyline", group));
       this.shapes.push({ part, group, drawn });
     }
     this.handles = joints.map((joint, number) => this.handle(joint, number));
@@ -122,17 +122,10 @@ export class Picture {
   /** Choose the scale so that all these rows are seen. */
   fit(rows: Float64Array): void {
     const length = rowLength(this.mechanism);
-    let [low, high]: Point[] = [
-      [Infinity, Infinity],
-      [-Infinity, -Infinity],
-    ];
+    const seen: Point[] = [];
     for (let start = 0; start < rows.length; start += length)
-      for (let joint = 0; joint < this.handles.length; joint++) {
-        const seen = this.seen(rows, start, joint);
-        low = [Math.min(low[0], seen[0]), Math.min(low[1], seen[1])];
-        high = [Math.max(high[0], seen[0]), Math.max(high[1], seen[1])];
-      }
-    this.view.fit(low, high);
+      this.handles.forEach((_, joint) => seen.push(this.seen(rows, start, joint)));
+    this.view.fit(...cornersOf(seen));
   }
 
   /** Draw the paths of the joints over all these rows. */
@@ -153,18 +146,12 @@ export class Picture {
     for (const { part, drawn } of this.shapes) {
       const visible = part.where < 0 || has(part.where);
       for (const one of drawn) one.style.display = visible ? "" : "none";
-      if (visible)
-        this.shape(
-          part,
-          drawn,
-          part.joints.map((joint) => places[joint]),
-        );
+      const at = part.joints.map((joint) => places[joint]);
+      if (visible) this.shape(part, drawn, at);
     }
     this.handles.forEach((handle, joint) => {
-      handle.setAttribute(
-        "transform",
-        `translate(${places[joint][0].toFixed(2)} ${places[joint][1].toFixed(2)})`,
-      );
+      const [x, y] = places[joint];
+      put(handle, { transform: `translate(${x.toFixed(2)} ${y.toFixed(2)})` });
     });
   }
 
@@ -203,9 +190,7 @@ export class Picture {
   svgText(): string {
     const copy = this.svg.cloneNode(true) as SVGSVGElement;
     const [width, height] = this.size;
-    copy.setAttribute("xmlns", SPACE);
-    copy.setAttribute("width", String(width));
-    copy.setAttribute("height", String(height));
+    put(copy, { xmlns: SPACE, width, height });
     for (const name of ["behind", "markers"]) copy.querySelector(`#${name}`)?.remove();
     const originals = this.svg.querySelectorAll<SVGElement>(KEPT);
     copy.querySelectorAll<SVGElement>(KEPT).forEach((one, n) => {
@@ -307,9 +292,8 @@ export class Picture {
     const [x, y] = LETTERS[number % LETTERS.length];
     element("text", handle, { x, y, "text-anchor": x < 0 ? "end" : "start" }).textContent = name;
     if (!free) return handle;
-    handle.setAttribute("tabindex", "0");
-    handle.setAttribute("role", "button");
-    handle.setAttribute("aria-label", `${name}, ${text}: drag it, or move it with the arrow keys`);
+    const label = `${name}, ${text}: drag it, or move it with the arrow keys`;
+    put(handle, { tabindex: 0, role: "button", "aria-label": label });
     handle.addEventListener("pointerdown", (event) => {
       event.stopPropagation();
       event.preventDefault();
@@ -329,13 +313,10 @@ export class Picture {
       this.held = -1;
       this.onDrag(number, this.target(event), true);
     };
-    handle.addEventListener("pointerup", release);
-    handle.addEventListener("pointercancel", release);
+    for (const name of ["pointerup", "pointercancel"] as const) handle.addEventListener(name, release);
     handle.addEventListener("keydown", (event) => {
-      const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+      const way = arrowOf(event);
       if (!way) return;
-      event.preventDefault();
-      event.stopPropagation();
       const [x, y] = this.seen(this.row, 0, number);
       const step = (event.shiftKey ? 20 : 2) / this.view.scale;
       this.onDrag(number, [x + step * way[0], y + step * way[1]], true);

@@ -1,5 +1,6 @@
 /** A plane with axes on a canvas: curves that turn back, squares, vectors. */
 
+import { make } from "./elements";
 import { digits } from "./words";
 
 export type Interval = [number, number];
@@ -19,7 +20,7 @@ export function ticks([low, high]: Interval, count: number): number[] {
 }
 
 export class Plane {
-  readonly canvas = document.createElement("canvas");
+  readonly canvas = make("canvas", { className: "plane" });
   readonly context = this.canvas.getContext("2d")!;
   private x: Interval = [0, 1];
   private y: Interval = [0, 1];
@@ -32,7 +33,6 @@ export class Plane {
     place: HTMLElement,
     private readonly height: number,
   ) {
-    this.canvas.className = "plane";
     place.append(this.canvas);
     new ResizeObserver(() => {
       if (place.clientWidth === 0 || place.clientWidth === this.width) return;
@@ -68,10 +68,7 @@ export class Plane {
     c.fillStyle = this.colour("text");
     c.textAlign = "center";
     for (const value of ticks(x, Math.max(3, room[0] / 90))) {
-      this.line([
-        [value, y[0]],
-        [value, y[1]],
-      ]);
+      this.mark(value, "x");
       const text = digits(value, 6);
       // the last one stays inside
       const most = width - c.measureText(text).width / 2;
@@ -79,10 +76,7 @@ export class Plane {
     }
     c.textAlign = "right";
     for (const value of ticks(y, Math.max(3, room[1] / 45))) {
-      this.line([
-        [x[0], value],
-        [x[1], value],
-      ]);
+      this.mark(value, "y");
       c.fillText(digits(value, 6), MARGIN.left - 6, this.py(value) + 4);
     }
     c.textAlign = "center";
@@ -126,6 +120,12 @@ export class Plane {
     points.forEach(([x, y], n) => c[n ? "lineTo" : "moveTo"](this.px(x), this.py(y)));
     c.stroke();
     c.setLineDash([]);
+  }
+
+  /** A line across the whole plane at a value along one of its axes. */
+  mark(value: number, axis: "x" | "y"): void {
+    const ends = axis === "x" ? this.y : this.x;
+    this.line(ends.map((end): Interval => (axis === "x" ? [value, end] : [end, value])));
   }
 
   /** A rectangle with slanting lines in it: it can be told apart without its colour. */

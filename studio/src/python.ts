@@ -29,15 +29,15 @@ export class WithPython {
   private readonly sketch: Sketch;
   private mechanism!: Mechanism;
   private parts = make("div");
-  private readonly bar = make("progress", { max: 1 });
-  private readonly doing = make("span");
+  private readonly bar = make("progress", { max: 1, "aria-label": "Progress of the job" });
+  private readonly doing = make("span", { role: "status" });
   private readonly running = line(
     this.bar,
     this.doing,
     button("Cancel", () => void this.server?.cancel()),
   );
-  private readonly fault = make("p", { className: "fault" });
-  private readonly answer = make("div");
+  private readonly fault = make("p", { className: "fault", role: "alert" });
+  private readonly answer = make("div", { "aria-live": "polite" });
   private begins: HTMLButtonElement[] = [];
   private wrong: HTMLElement | undefined;
   private busyWith = false;
@@ -48,10 +48,6 @@ export class WithPython {
     private readonly desk: Desk,
   ) {
     this.sketch = new Sketch(view, document.getElementById("picture") as unknown as SVGSVGElement);
-    this.bar.setAttribute("aria-label", "Progress of the job");
-    this.doing.setAttribute("role", "status");
-    this.fault.setAttribute("role", "alert");
-    this.answer.setAttribute("aria-live", "polite");
     this.running.hidden = true;
     place.append(make("h2", { textContent: "With Python" }));
     if (this.server) {

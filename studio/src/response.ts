@@ -9,6 +9,7 @@ import {
   findJumps,
   rangesToAvoid,
 } from "./avoid";
+import { make } from "./elements";
 import type { Found } from "./explore";
 import type { Point } from "./motions";
 import { type Go, Search } from "./search";
@@ -26,7 +27,7 @@ export class Response extends Search {
   private parts: Point[][] = [];
   private sentences: string[] = [];
   /** Whose amplitude is shown, where several coordinates swing. */
-  private readonly whose = document.createElement("select");
+  private readonly whose = make("select", { "aria-label": "Whose amplitude is shown" });
   avoided: Avoided[] = [];
 
   constructor(
@@ -34,7 +35,6 @@ export class Response extends Search {
     private readonly tolerance: number,
   ) {
     super("Response: how far the links swing over the speed", ["What varies"], HEIGHT, go);
-    this.whose.setAttribute("aria-label", "Whose amplitude is shown");
     this.whose.addEventListener("change", () => {
       if (this.done) this.tell();
       this.draw();
@@ -126,10 +126,7 @@ export class Response extends Search {
     const now = givenValue(given!, this.context!.values) * given!.factor;
     c.lineWidth = 1.5;
     c.strokeStyle = plane.colour("text");
-    plane.line([
-      [now, 0],
-      [now, top],
-    ]);
+    plane.mark(now, "x");
     const { canvas } = plane;
     canvas.setAttribute("aria-label", `${called(given!)}, with the amplitude over it`);
     canvas.setAttribute("aria-valuemin", String(x[0]));
@@ -149,16 +146,13 @@ export class Response extends Search {
     this.avoided = arcs.length > 0 ? rangesToAvoid(arcs, low, high, swinging(this.context!).map(called)) : [];
     const speed = given!.unit === "rpm" ? "Speeds" : `Values of ${called(given!)}`;
     const { natural } = this.context!;
-    const lines: string[] = [];
-    if (this.avoided.length > 0)
-      lines.push(
-        `${speed} to avoid: ${this.avoided.map((one) => `${at(one.low)} to ${at(one.high)} (${one.why})`).join("; ")}.`,
-      );
-    else
-      lines.push(
-        arcs.length > 0 ? `${speed} to avoid: none in this range.` : "No periodic motion was found.",
-      );
-    lines.push("Motions that no branch leads to were not sought; the command linkwork resonance seeks them.");
+    const avoided = this.avoided.map((one) => `${at(one.low)} to ${at(one.high)} (${one.why})`).join("; ");
+    const lines = [
+      arcs.length > 0
+        ? `${speed} to avoid: ${avoided || "none in this range"}.`
+        : "No periodic motion was found.",
+      "Motions that no branch leads to were not sought; the command linkwork resonance seeks them.",
+    ];
     for (const { value, rising, before, after } of findJumps(arcs)) {
       const then = after.map((amplitude) => shown(amplitude, output)).join(" or ");
       lines.push(
@@ -171,17 +165,11 @@ export class Response extends Search {
       lines.push(`The period doubles at ${doublings.map((point) => at(point.value)).join(", ")}.`);
     if (Number.isFinite(natural) && given!.unit === "rpm")
       lines.push(`Natural frequency ${shown(natural, given!)} (mean effective mass).`);
-    for (const sentence of new Set(this.sentences)) lines.push(sentence);
     lines.push(
+      ...new Set(this.sentences),
       "Solid: stable; dashed: unstable; square: fold; diamond: the period doubles; hatched: to avoid.",
     );
-    this.words.replaceChildren(
-      ...lines.map((line) => {
-        const paragraph = document.createElement("p");
-        paragraph.textContent = line;
-        return paragraph;
-      }),
-    );
+    this.words.replaceChildren(...lines.map((textContent) => make("p", { textContent })));
   }
 
   protected point(event: MouseEvent): void {

@@ -1,7 +1,8 @@
 /** What is common to charts that take seconds: what varies and between which values, a search that goes on beside the page. */
 
+import { Explorer } from "./background";
+import { make } from "./elements";
 import type { Exploration, Found } from "./explore";
-import { Explorer } from "./explorer";
 import { Plane } from "./plane";
 import { type Given, type Mechanism, type Range, type Values, allGiven, givenValue } from "./tables";
 import { type Context, variables } from "./varied";
@@ -23,11 +24,11 @@ interface Axis {
 }
 
 export abstract class Search {
-  readonly box = document.createElement("figure");
+  readonly box: HTMLElement;
   protected readonly plane: Plane;
-  protected readonly words = document.createElement("div");
+  protected readonly words = make("div", { className: "told", "aria-live": "polite" });
   /** What is wrong with a range. */
-  private readonly fault = document.createElement("p");
+  private readonly fault = make("p", { className: "fault", role: "alert" });
   protected readonly axes: Axis[];
   protected context: Context | undefined;
   private readonly explorer = new Explorer((found, done) => this.take(found, done));
@@ -45,17 +46,11 @@ export abstract class Search {
     height: number,
     protected readonly go: Go,
   ) {
-    const row = document.createElement("div");
-    row.className = "axes";
+    const row = make("div", { className: "axes" });
     this.axes = names.map((name) => this.axis(row, name));
-    this.fault.className = "fault";
-    this.fault.setAttribute("role", "alert");
-    this.box.append(row, this.fault);
+    this.box = make("figure", { "aria-label": title }, row, this.fault);
     this.plane = new Plane(this.box, height);
-    this.words.setAttribute("aria-live", "polite");
-    this.words.className = "told";
     this.box.append(this.words);
-    this.box.setAttribute("aria-label", title);
     this.plane.onSize = () => this.draw();
     const { canvas } = this.plane;
     canvas.tabIndex = 0;
@@ -182,21 +177,16 @@ export abstract class Search {
   }
 
   private axis(row: HTMLElement, name: string): Axis {
-    const box = document.createElement("span");
-    const select = document.createElement("select");
-    select.setAttribute("aria-label", name);
+    const select = make("select", { "aria-label": name });
+    const box = make("span", {}, select);
     const axis: Axis = { select, ends: [], given: undefined };
     select.addEventListener("change", () => {
       axis.given = this.context!.mechanism.given.find((given) => given.name === select.value);
       this.fault.textContent = "";
       this.renew();
     });
-    box.append(select);
     for (const word of ["from", "to"]) {
-      const end = document.createElement("input");
-      end.type = "number";
-      end.step = "any";
-      end.setAttribute("aria-label", `${name}: ${word}`);
+      const end = make("input", { type: "number", step: "any", "aria-label": `${name}: ${word}` });
       end.addEventListener("change", () => {
         const given = axis.given!;
         const [low, high] = axis.ends.map((one) => one.valueAsNumber / given.factor);

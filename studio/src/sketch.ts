@@ -1,8 +1,8 @@
 /** A path that is drawn over the mechanism, by hand or by its points, and curves beside it. */
 
+import { element, written } from "./picture";
 import type { Point, View } from "./view";
 
-const SPACE = "http://www.w3.org/2000/svg";
 /** Points of a path that was drawn; the share of its extent within which its ends are one. */
 const POINTS = 72;
 const NEAR = 0.2;
@@ -40,12 +40,13 @@ export class Sketch {
   onDrawing: (drawing: boolean) => void = () => {};
   private beside: Point[] = [];
   private drawing = false;
-  private readonly layer = document.createElementNS(SPACE, "g");
+  private readonly layer: SVGGElement;
 
   constructor(
     private readonly view: View,
     private readonly svg: SVGSVGElement,
   ) {
+    this.layer = element("g", svg);
     // before the joints and the view hear of it
     svg.addEventListener("pointerdown", (event) => this.begin(event), true);
   }
@@ -105,12 +106,8 @@ export class Sketch {
   draw(): void {
     const line = (points: Point[], closed: boolean, name: string): void => {
       if (points.length < 2) return;
-      const made = document.createElementNS(SPACE, "polyline");
-      made.setAttribute("class", name);
-      const all = closed ? [...points, points[0]] : points;
-      const written = all.map((point) => this.view.place(point).map((value) => value.toFixed(2)));
-      made.setAttribute("points", written.map((pair) => pair.join(",")).join(" "));
-      this.layer.append(made);
+      const all = (closed ? [...points, points[0]] : points).map((point) => this.view.place(point));
+      element("polyline", this.layer, { class: name, points: written(all) });
     };
     this.layer.replaceChildren();
     line(this.points, this.closed, "wanted");

@@ -4,6 +4,7 @@ import { type Cell, type Found, middle } from "./explore";
 import { type Go, Search } from "./search";
 import { type Context, driving } from "./varied";
 import { type Given, givenValue } from "./tables";
+import { arrowOf } from "./view";
 import { called, multiplierInWords, shown, verdictInWords } from "./words";
 
 const HEIGHT = 300;
@@ -100,14 +101,8 @@ export class Stability extends Search {
     const now = [x, y].map((given) => givenValue(given, this.context!.values) * given.factor);
     c.lineWidth = 1.5;
     c.strokeStyle = plane.colour("text");
-    plane.line([
-      [now[0], ends[1][0]],
-      [now[0], ends[1][1]],
-    ]);
-    plane.line([
-      [ends[0][0], now[1]],
-      [ends[0][1], now[1]],
-    ]);
+    plane.mark(now[0], "x");
+    plane.mark(now[1], "y");
     if (this.place) {
       const [column, row] = this.place;
       const corners = [0, 1, 1, 0, 0].map((dx, n): [number, number] => [
@@ -149,8 +144,8 @@ export class Stability extends Search {
     if (cell) this.goTo(cell);
   }
 
-  protected press({ key }: KeyboardEvent): boolean {
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key];
+  protected press(event: KeyboardEvent): boolean {
+    const way = arrowOf(event);
     const before = this.place ?? [this.grid[0] >> 1, this.grid[1] >> 1];
     if (way) {
       const [column, row] = [0, 1].map((axis) =>
@@ -167,7 +162,7 @@ export class Stability extends Search {
       this.draw();
       return true;
     }
-    const cell = key === "Enter" && this.place ? this.at(this.place) : undefined;
+    const cell = event.key === "Enter" && this.place ? this.at(this.place) : undefined;
     if (cell) this.goTo(cell);
     return cell !== undefined;
   }

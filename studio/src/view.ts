@@ -16,6 +16,36 @@ const STEP = 40;
 const TURN = 0.1;
 const LARGER = 1.25;
 
+/** Directions of the arrow keys, to the right and upwards. */
+const ARROWS: Record<string, Point> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+
+/** The direction of an arrow key, which nothing else hears of then; nothing of another key. */
+export function arrowOf(event: KeyboardEvent): Point | undefined {
+  const way = ARROWS[event.key];
+  if (way) event.preventDefault();
+  if (way) event.stopPropagation();
+  return way;
+}
+
+/** The lower left and the upper right corner of what lies about points. */
+export function cornersOf(points: Iterable<Point>): [Point, Point] {
+  const [low, high]: [Point, Point] = [
+    [Infinity, Infinity],
+    [-Infinity, -Infinity],
+  ];
+  for (const point of points)
+    for (const n of [0, 1]) {
+      low[n] = Math.min(low[n], point[n]);
+      high[n] = Math.max(high[n], point[n]);
+    }
+  return [low, high];
+}
+
 const clamp = (value: number, most: number): number => Math.max(-most, Math.min(most, value));
 
 /** Rows of the matrix from places to what is seen, both in m, and in the third what is nearer. */
@@ -196,10 +226,9 @@ export class View {
 
   private key(event: KeyboardEvent): void {
     if (event.target !== this.svg) return;
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const way = arrowOf(event);
     if (!way) return;
-    event.preventDefault();
-    if (this.planar || event.shiftKey) this.pan(-STEP * way[0], -STEP * way[1]);
-    else this.turn(TURN * way[0], TURN * way[1]);
+    if (this.planar || event.shiftKey) this.pan(-STEP * way[0], STEP * way[1]);
+    else this.turn(TURN * way[0], -TURN * way[1]);
   }
 }

@@ -1,6 +1,7 @@
 /** What stands beside the mechanism, one thing at a time: curves over the motion, forces, the response, stability. */
 
 import { Charts } from "./charts";
+import { make } from "./elements";
 import type { Rows } from "./motions";
 import { Forces } from "./forces";
 import { Response } from "./response";
@@ -26,7 +27,7 @@ export class Views {
   private readonly charts: Charts;
   private readonly forces = new Forces();
   private readonly buttons = new Map<Tab, HTMLButtonElement>();
-  private readonly panel = document.createElement("div");
+  private readonly panel = make("div", { id: "view", role: "tabpanel" });
   private tab: Tab = "motion";
   private mechanism!: Mechanism;
   private rows: Rows | undefined;
@@ -34,20 +35,12 @@ export class Views {
   private row = 0;
 
   constructor(place: HTMLElement, go: Go, tolerance: number) {
-    const sheet = document.createElement("style");
-    sheet.textContent = style;
-    document.head.append(sheet);
-    const list = document.createElement("div");
-    list.setAttribute("role", "tablist");
-    list.setAttribute("aria-label", "Charts");
-    list.className = "buttons";
+    document.head.append(make("style", { textContent: style }));
+    const list = make("div", { className: "buttons", role: "tablist", "aria-label": "Charts" });
     const names = Object.keys(TABS) as Tab[];
     for (const name of names) {
-      const button = document.createElement("button");
-      button.id = `tab ${name}`;
-      button.textContent = TABS[name];
-      button.setAttribute("role", "tab");
-      button.setAttribute("aria-controls", "view");
+      const attributes = { role: "tab", "aria-controls": "view" };
+      const button = make("button", { id: `tab ${name}`, textContent: TABS[name], ...attributes });
       button.addEventListener("click", () => this.open(name));
       this.buttons.set(name, button);
       list.append(button);
@@ -59,10 +52,7 @@ export class Views {
       this.open(names[(names.indexOf(this.tab) + way + names.length) % names.length]);
       this.buttons.get(this.tab)!.focus();
     });
-    this.panel.id = "view";
-    this.panel.setAttribute("role", "tabpanel");
-    const curves = document.createElement("div");
-    curves.id = "curves";
+    const curves = make("div", { id: "curves" });
     this.response = new Response(go, tolerance);
     this.stability = new Stability(go, tolerance);
     this.panel.append(curves, this.forces.box, this.response.box, this.stability.box);
@@ -93,8 +83,7 @@ export class Views {
     this.forces.box.hidden = tab !== "forces";
     this.response.box.hidden = tab !== "response";
     this.stability.box.hidden = tab !== "stability";
-    const kinds: string[] = [tab];
-    this.charts.show(this.mechanism, this.source, (chart: Chart) => kinds.includes(chart.kind));
+    this.charts.show(this.mechanism, this.source, ({ kind }: Chart) => kind === tab);
     this.response.show(tab === "response");
     this.stability.show(tab === "stability");
     if (this.rows) this.data(this.rows, this.source);
