@@ -1,5 +1,4 @@
 from .charts import HeatMap as HeatMap
-from .charts import plot_charts as plot_charts
 from .control import plot_bode as plot_bode
 from .control import plot_poles as plot_poles
 from .curves import Curve as Curve

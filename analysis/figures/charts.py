@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import cycle, islice
 from typing import Any
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
 from ..units import RAD_S_PER_RPM, display_scale
-from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, register_picture
+from .curves import Curve, Panel, Picture, draw_panel, draw_part, register_picture
 from .style import COLOURS, LIGHT, label_in_words, legend_above, name_in_words
 
 #: Colour of points that have no value.
@@ -75,20 +75,6 @@ class HeatMap:
     classes: Mapping[str, str] = field(default_factory=dict)
     sides: tuple[str, str] | None = None
     hover: Mapping[str, ArrayLike] = field(default_factory=dict)
-
-
-def plot_charts(
-    charts: Sequence[Panel | HeatMap], *, title: str, columns: int = 1, size: tuple[float, float] = (5.4, 3.9)
-) -> Figure:
-    """Plot charts for print, with colours or with curves alone.
-
-    Parameters
-    ----------
-    charts : sequence of Panel or HeatMap
-    title, columns, size
-        See `Picture`.
-    """
-    return draw(Picture(parts=charts, title=title, columns=columns, size=size))
 
 
 def colour_scale(chart: HeatMap) -> tuple[Normalize, Colormap]:

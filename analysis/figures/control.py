@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..libraries import lazy
 from ..linear import Design, LinearModel
 from .dispatch import plot
-from .style import BOLD, COLOURS, DOT, LINE, LINES, REFERENCE, figure_style, finish, legend_above, write_title
+from .style import BOLD, COLOURS, DOT, LINE, LINES, REFERENCE, figure_style, finish, legend_above
 
 if TYPE_CHECKING:
     import control
@@ -25,6 +25,7 @@ else:
 FloatArray: TypeAlias = NDArray[np.float64]
 
 
+@figure_style()
 def plot_bode(
     systems: Mapping[str, Any],
     *,
@@ -48,35 +49,33 @@ def plot_bode(
     title : str
     """
     responses = control.frequency_response(list(systems.values()), frequencies)
-    with figure_style():
-        figure = Figure(figsize=(6.4, 4.8))
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        for number, ((label, system), response) in enumerate(zip(systems.items(), responses)):
-            look = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINES[number % len(LINES)]}
-            # python-control squeezes the axes of one input and one output away
-            value = np.asarray(response.frdata)[0, 0]
-            phase = np.degrees(np.unwrap(np.angle(value)))
-            # shifted by whole turns so that the first value is within half a turn
-            phase -= 360.0 * round(phase[0] / 360.0)
-            words = label
-            if margins:
-                found = _Margins.from_loop(system)
-                words = ": ".join(text for text in (label, found.report()) if text)
-                _mark_margins(above, below, found, response.omega, phase, look["color"])
-            above.loglog(response.omega, np.abs(value), label=words or None, **look)
-            below.semilogx(response.omega, phase, **look)
+    figure = Figure(figsize=(6.4, 4.8))
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    for number, ((label, system), response) in enumerate(zip(systems.items(), responses)):
+        look = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINES[number % len(LINES)]}
+        # python-control squeezes the axes of one input and one output away
+        value = np.asarray(response.frdata)[0, 0]
+        phase = np.degrees(np.unwrap(np.angle(value)))
+        # shifted by whole turns so that the first value is within half a turn
+        phase -= 360.0 * round(phase[0] / 360.0)
+        words = label
         if margins:
-            above.axhline(1.0, **REFERENCE)
-            below.axhline(-180.0, **REFERENCE)
-        above.set_ylabel(f"magnitude [{unit}]" if unit else "magnitude")
-        below.set_ylabel("phase [deg]")
-        below.set_xlabel("frequency [rad/s]")
-        below.yaxis.set_major_locator(MultipleLocator(90.0))
-        if any(systems) or margins:
-            legend_above(above, ncols=1 if margins else 4)
-        write_title(figure, title)
-        figure.align_ylabels()
-        return finish(figure)
+            found = _Margins.from_loop(system)
+            words = ": ".join(text for text in (label, found.report()) if text)
+            _mark_margins(above, below, found, response.omega, phase, look["color"])
+        above.loglog(response.omega, np.abs(value), label=words or None, **look)
+        below.semilogx(response.omega, phase, **look)
+    if margins:
+        above.axhline(1.0, **REFERENCE)
+        below.axhline(-180.0, **REFERENCE)
+    above.set_ylabel(f"magnitude [{unit}]" if unit else "magnitude")
+    below.set_ylabel("phase [deg]")
+    below.set_xlabel("frequency [rad/s]")
+    below.yaxis.set_major_locator(MultipleLocator(90.0))
+    if any(systems) or margins:
+        legend_above(above, ncols=1 if margins else 4)
+    figure.align_ylabels()
+    return finish(figure, title)
 
 
 class _Margins(NamedTuple):
@@ -144,10 +143,7 @@ def plot_linear_model(
     return plot_bode({"": model.to_state_space((target,), (source,))}, unit=f"{units[target]}/{per}", **options)
 
 
-def _legend_entry(label: str, what: str) -> str:
-    return f"{label}: {what}" if label else what
-
-
+@figure_style()
 def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
     """Plot poles (crosses) and zeros (circles) of systems in the complex plane, with one scale on both axes.
 
@@ -156,29 +152,25 @@ def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
     systems : mapping
         Linear systems of python-control, by their names in the legend.
     """
-    with figure_style():
-        figure = Figure(figsize=(6.4, 5.0))
-        axis = figure.subplots()
-        axis.axhline(0.0, **REFERENCE)
-        axis.axvline(0.0, **REFERENCE)
-        for number, (label, system) in enumerate(systems.items()):
-            points = control.pole_zero_map(system)
-            colour = COLOURS[number % len(COLOURS)]
-            # systems with a common pole or zero show rings of different sizes there
-            size = DOT * (1.0 + 0.5 * number)
-            look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3, "markersize": size}
-            poles, zeros = np.asarray(points.poles), np.asarray(points.zeros)
-            axis.plot(
-                poles.real, poles.imag, marker="x", label=_legend_entry(label, "poles"), markeredgewidth=LINE, **look
-            )
-            if len(zeros):
-                axis.plot(
-                    zeros.real, zeros.imag, marker="o", fillstyle="none", label=_legend_entry(label, "zeros"), **look
-                )
-        axis.set_xlabel("real part [1/s]")
-        axis.set_ylabel("imaginary part [rad/s]")
-        axis.set_aspect("equal", adjustable="datalim")
-        axis.margins(0.12)
-        axis.legend()
-        write_title(figure, title)
-        return finish(figure)
+    figure = Figure(figsize=(6.4, 5.0))
+    axis = figure.subplots()
+    axis.axhline(0.0, **REFERENCE)
+    axis.axvline(0.0, **REFERENCE)
+    for number, (label, system) in enumerate(systems.items()):
+        points = control.pole_zero_map(system)
+        colour = COLOURS[number % len(COLOURS)]
+        # systems with a common pole or zero show rings of different sizes there
+        size = DOT * (1.0 + 0.5 * number)
+        look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3, "markersize": size}
+        for what, places, mark in (
+            ("poles", np.asarray(points.poles), {"marker": "x", "markeredgewidth": LINE}),
+            ("zeros", np.asarray(points.zeros), {"marker": "o", "fillstyle": "none"}),
+        ):
+            if len(places) or what == "poles":
+                axis.plot(places.real, places.imag, label=f"{label}: {what}".removeprefix(": "), **look | mark)
+    axis.set_xlabel("real part [1/s]")
+    axis.set_ylabel("imaginary part [rad/s]")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.margins(0.12)
+    axis.legend()
+    return finish(figure, title)

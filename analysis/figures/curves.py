@@ -157,70 +157,69 @@ class Picture:
 
 
 def plot_curves(
-    panels: Sequence[Panel],
+    panels: Sequence[Any],
     *,
     title: str,
     columns: int = 1,
     size: tuple[float, float] = (6.4, 3.7),
     notes: Sequence[str] = (),
 ) -> style.Figure:
-    """Plot curves for print, one pair of axes per panel.
+    """Plot curves and charts for print, one pair of axes each.
 
     Parameters
     ----------
-    panels : sequence of Panel
+    panels : sequence of Panel or HeatMap
     title, columns, size, notes
         See `Picture`.
     """
     return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
 
-def register_picture(describe: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
-    """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
-
-    The two functions are registered with `dispatch.picture` and `dispatch.plot`, by the type of their first argument.
-    """
+def drawn(describe: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
+    """Return a function that draws what ``describe`` returns as a figure."""
 
     @wraps(describe)
     def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> style.Figure:
         return draw(describe(*arguments, **options))
 
-    picture.register(describe)
-    plot.register(plot_picture)
     return plot_picture
 
 
+def register_picture(describe: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
+    """Register a function that returns the picture of a result, by the type of its first argument; return it as `drawn`."""
+    picture.register(describe)
+    plot.register(drawn(describe))
+    return drawn(describe)
+
+
+@style.figure_style()
 def draw(picture: Picture) -> style.Figure:
     """Draw a picture as a figure with one pair of axes for each part."""
     parts, columns, size = picture.parts, picture.columns, picture.size
     rows = ceil(len(parts) / columns)
     heights = picture.heights or [1.0] * rows
-    with style.figure_style():
-        figure = style.Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
-        FigureCanvasAgg(figure)  # measures all texts with one renderer, instead of a new one each
-        axes = figure.subplots(
-            rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
-        )
-        for axis, part in zip(axes.flat, parts):
-            draw_part(part, figure, axis)
-            if picture.heights:
-                axis.label_outer(remove_inner_ticks=False)
-        for axis in list(axes.flat)[len(parts) :]:
-            axis.remove()
+    figure = style.Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
+    FigureCanvasAgg(figure)  # measures all texts with one renderer, instead of a new one each
+    axes = figure.subplots(
+        rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
+    )
+    for axis, part in zip(axes.flat, parts):
+        draw_part(part, figure, axis)
         if picture.heights:
-            style.align_labels(list(axes.flat))
-        style.write_title(figure, picture.title)
-        style.write_notes(figure, picture.notes)
-        return settle(style.finish(figure))
+            axis.label_outer(remove_inner_ticks=False)
+    for axis in list(axes.flat)[len(parts) :]:
+        axis.remove()
+    if picture.heights:
+        style.align_labels(list(axes.flat))
+    return settle(style.finish(figure, picture.title, picture.notes))
 
 
+@style.figure_style()
 def resize(figure: style.Figure, width: float, height: float) -> style.Figure:
     """Change the size of a drawn figure (inches) and lay it out again."""
-    with style.figure_style():
-        figure.set_layout_engine("constrained")
-        figure.set_size_inches(width, height)
-        style.write_title(figure, figure.get_suptitle().replace("\n", " "))
-        return settle(style.finish(figure))
+    figure.set_layout_engine("constrained")
+    figure.set_size_inches(width, height)
+    return settle(style.finish(figure, figure.get_suptitle().replace("\n", " ")))
 
 
 @singledispatch
@@ -253,7 +252,7 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
     for number, curve in enumerate(panel.curves):
         _draw_curve(axis, curve, curve.colour or style.COLOURS[number % len(style.COLOURS)])
     for entry, number, those in shades_by_label(panel):
-        colour, hatch, _ = style.SHADES[number]
+        colour, hatch = style.SHADES[number]
         for shade, name in zip(those, (entry or None, *[None] * len(those))):
             look: dict[str, Any] = {"facecolor": (colour, 0.16), "edgecolor": (colour, 0.45), "linewidth": 0.0}
             axis.axvspan(shade.low, shade.high, hatch=hatch, label=name, zorder=0.5, **look)

@@ -12,7 +12,7 @@ documented. Modules that draw are imported one after another until one of them c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import singledispatch
 from importlib import import_module
 from pathlib import Path
@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 from linkwork.errors import LinkworkError
 
-from ..mechanisms import MECHANISMS as REGISTRY
+from ..mechanisms import MECHANISMS
 from ..run import Trajectory
 
 #: The modules that register functions for results, in order of import time.
@@ -44,8 +44,8 @@ MODULES = (
     "scheme",
     "systems",
 )
-#: The modules that register functions for `draw_mechanism`.
-MECHANISMS = ("linkage", "slider_crank_picture")
+#: The modules that have a `draw_at_start` for one mechanism, by its name.
+_OWN = {"five-bar": "linkage", "slider-crank": "slider_crank_picture"}
 #: Greatest number of samples over which the path of a point is drawn.
 _TRACED = 20_000
 
@@ -58,25 +58,18 @@ class DrawingError(LinkworkError, TypeError):
         super().__init__(f"results of the type {kind.__qualname__} have no {picture}")
 
 
-def _find(pictures: Any, kind: type, modules: Sequence[str] = MODULES) -> Callable[..., Any] | None:
-    """Return the function registered for a type of result; None if there is none.
+def _registered_function(pictures: Any, result: object, name: str) -> Callable[..., Any]:
+    """Return the function registered for the type of a result; raise DrawingError with a ``name`` if there is none.
 
-    ``pictures`` is a single-dispatch function such as `plot`; ``modules`` are imported until one registers the type.
+    ``pictures`` is a single-dispatch function such as `plot`; `MODULES` are imported until one registers the type.
     """
     nothing = pictures.dispatch(object)
-    for module in modules:
+    for module in MODULES:
         import_module(f".{module}", __package__)
-        function: Callable[..., Any] = pictures.dispatch(kind)
+        function: Callable[..., Any] = pictures.dispatch(type(result))
         if function is not nothing:
             return function
-    return None
-
-
-def _registered_function(pictures: Any, result: object, name: str) -> Callable[..., Any]:
-    function = _find(pictures, type(result))
-    if function is None:
-        raise DrawingError(type(result), name)
-    return function
+    raise DrawingError(type(result), name)
 
 
 @singledispatch
@@ -148,29 +141,18 @@ def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Pat
     return _registered_function(animate, result, "animation")(result, path, *details, **options)
 
 
-@singledispatch
-def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
-    """Draw a mechanism at the start of a run, with the paths of its points over the run.
+def mechanism_drawer(parameters: object) -> Callable[[Any, Axes, Trajectory], str] | None:
+    """Return the function that draws a mechanism at the start of a run, with the paths of its points over the run.
 
-    Returns
-    -------
-    str
-        Caption of the drawing.
-
-    Raises
-    ------
-    DrawingError
-        If there is no picture of this mechanism: see `has_picture`.
+    The function takes the parameters, axes and the run, and returns the caption of the drawing. The result is None if there is
+    no picture of the mechanism of these parameters.
     """
-    if not _has_planar_drawing(parameters):
-        raise DrawingError(type(parameters), "picture")
-    return import_module(".scheme", __package__).draw_run(parameters, axis, run)
-
-
-def _has_planar_drawing(parameters: object) -> bool:
-    """Return whether the mechanism of these parameters has a planar `Drawing`."""
-    kind = next((m for m in REGISTRY.values() if isinstance(parameters, m.parameters)), None)
-    return kind is not None and kind.drawing is not None and kind.drawing.planar
+    kind = next((m for m in MECHANISMS.values() if isinstance(parameters, m.parameters)), None)
+    if kind is None or not (kind.name in _OWN or (kind.drawing is not None and kind.drawing.planar)):
+        return None
+    drawer: Callable[[Any, Axes, Trajectory], str]
+    drawer = import_module(f".{_OWN.get(kind.name, 'scheme')}", __package__).draw_at_start
+    return drawer
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
@@ -181,8 +163,3 @@ def last_samples(run: Trajectory) -> tuple[slice, str]:
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"
-
-
-def has_picture(parameters: object) -> bool:
-    """Return whether `draw_mechanism` draws the mechanism of these parameters."""
-    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None or _has_planar_drawing(parameters)

@@ -30,6 +30,7 @@ VIEW = 2.2
 
 
 @plot.register
+@style.figure_style()
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
     """Plot the poses with all dyads that guide the body through them; in panels below, plot the four-bars and their defects.
 
@@ -38,88 +39,72 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
-    with style.figure_style():
-        figure = Figure(figsize=(9.0, 4.0 + 3.2 * rows))
-        parts: Any = figure.subfigures(2, 1, height_ratios=(4.0, 3.2 * rows)) if rows else [figure]
-        poses, axis = parts[0].subplots(1, 2)
-        _draw_poses(poses, found, numbered=True)
-        poses.margins(0.15)
-        poses.set_title("the poses: a long arm along the body, a short one across")
-        _set_equal_scale(poses)
-        _draw_poses(axis, found)
-        for dyad, colour in zip(found.dyads, style.COLOURS):
-            x, y = _parts(MM_PER_METRE * np.array([dyad.pivot, dyad.point], dtype=complex))
-            axis.plot(x, y, linewidth=2.4, zorder=4, color=colour)
-            axis.plot(x[0], y[0], "^", markersize=7.0, zorder=5, color=colour)
-            axis.plot(x[1], y[1], "o", markersize=style.DOT, zorder=5, color=colour, markerfacecolor="white")
-        axis.set_title("links between a fixed pivot (triangle)\nand a point of the body (circle), in pose 1")
-        _set_equal_scale(axis)
-        if rows:
-            panels = parts[1].subplots(rows, columns, squeeze=False).ravel()
-            for panel, (number, solution) in zip(panels, enumerate(found.solutions, start=1)):
-                _draw_poses(panel, found)
-                _draw_links(panel, solution, found.dyads)
-                panel.set_aspect("equal", adjustable="datalim")
-                panel.set_title(f"{number}: {_verdict(solution)}", fontsize=style.SMALL)
-            for panel in panels[count:]:
-                panel.set_visible(False)
-        style.write_title(figure, f"{title}: {found.describe()}".removeprefix(": "))
-        style.write_notes(
-            figure, ["Thick: the crank, in the colour of its link above. Thin triangle: the body with its point."]
-        )
-        return place_marks(style.finish(figure))
+    figure = Figure(figsize=(9.0, 4.0 + 3.2 * rows))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(4.0, 3.2 * rows)) if rows else [figure]
+    poses, axis = parts[0].subplots(1, 2)
+    _draw_poses(poses, found, numbered=True)
+    poses.margins(0.15)
+    poses.set_title("the poses: a long arm along the body, a short one across")
+    style.use_one_scale(poses)
+    _draw_poses(axis, found)
+    for dyad, colour in zip(found.dyads, style.COLOURS):
+        x, y = _parts(MM_PER_METRE * np.array([dyad.pivot, dyad.point], dtype=complex))
+        axis.plot(x, y, linewidth=2.4, zorder=4, color=colour)
+        axis.plot(x[0], y[0], "^", markersize=7.0, zorder=5, color=colour)
+        axis.plot(x[1], y[1], "o", markersize=style.DOT, zorder=5, color=colour, markerfacecolor="white")
+    axis.set_title("links between a fixed pivot (triangle)\nand a point of the body (circle), in pose 1")
+    style.use_one_scale(axis)
+    if rows:
+        panels = parts[1].subplots(rows, columns, squeeze=False).ravel()
+        for panel, (number, solution) in zip(panels, enumerate(found.solutions, start=1)):
+            _draw_poses(panel, found)
+            _draw_links(panel, solution, found.dyads)
+            panel.set_aspect("equal", adjustable="datalim")
+            panel.set_title(f"{number}: {_verdict(solution)}", fontsize=style.SMALL)
+        for panel in panels[count:]:
+            panel.set_visible(False)
+    said = "Thick: the crank, in the colour of its link above. Thin triangle: the body with its point."
+    return place_marks(style.finish(figure, f"{title}: {found.describe()}".removeprefix(": "), [said]))
 
 
 @plot.register
+@style.figure_style()
 def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
     """Plot the curves of fixed pivots and body points with the best linkage, and beside them the quality of each crank pivot.
 
     The quality is the least transmission angle of the four-bar with this crank and the rocker that is best for it.
     """
-    with style.figure_style():
-        figure = Figure(figsize=(10.4, 5.4))
-        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        low, high = _view(found)
-        _draw_poses(left, found, numbered=True, arm=_ARM_IN_VIEW * (high - low).real)
-        for curve, colour, label in (
-            (found.pivots, style.GROUND, "where a fixed pivot can be"),
-            (found.points, style.TRACE, "where its point of the body is in pose 1"),
-        ):
-            left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=3.0, color=colour, zorder=2, label=label)
-        if found.solutions:
-            _draw_links(left, found.solutions[0], named=True)
-        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-        best = np.degrees(np.where(found.sound, found.transmission, 0.0).max(axis=1, initial=0.0))
-        x, y = _parts(MM_PER_METRE * found.pivots)
-        right.plot(x[best <= 0.0], y[best <= 0.0], ".", markersize=3.0, color="0.75", label="with a defect")
-        order = np.argsort(best)[np.count_nonzero(best <= 0.0) :]
-        dots = right.scatter(x[order], y[order], c=best[order], s=16.0, cmap="viridis", zorder=4)
-        if found.solutions:
-            a = MM_PER_METRE * np.array(found.solutions[0].linkage.pins(0.0)["A"])
-            right.plot(
-                *a,
-                "o",
-                markersize=13.0,
-                markerfacecolor="none",
-                color=style.CRANK,
-                zorder=5,
-                label="best, as on the left",
-            )
-        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-        scale = right.inset_axes((1.03, 0.0, 0.05, 1.0))
-        figure.colorbar(
-            dots, cax=scale, label="pivot of the crank: least transmission angle\nwith the best rocker [deg]"
+    figure = Figure(figsize=(10.4, 5.4))
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    low, high = _view(found)
+    _draw_poses(left, found, numbered=True, arm=_ARM_IN_VIEW * (high - low).real)
+    for curve, colour, label in (
+        (found.pivots, style.GROUND, "where a fixed pivot can be"),
+        (found.points, style.TRACE, "where its point of the body is in pose 1"),
+    ):
+        left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=3.0, color=colour, zorder=2, label=label)
+    if found.solutions:
+        _draw_links(left, found.solutions[0], named=True)
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    best = np.degrees(np.where(found.sound, found.transmission, 0.0).max(axis=1, initial=0.0))
+    x, y = _parts(MM_PER_METRE * found.pivots)
+    right.plot(x[best <= 0.0], y[best <= 0.0], ".", markersize=3.0, color="0.75", label="with a defect")
+    order = np.argsort(best)[np.count_nonzero(best <= 0.0) :]
+    dots = right.scatter(x[order], y[order], c=best[order], s=16.0, cmap="viridis", zorder=4)
+    if found.solutions:
+        a = MM_PER_METRE * np.array(found.solutions[0].linkage.pins(0.0)["A"])
+        right.plot(
+            *a, "o", markersize=13.0, markerfacecolor="none", color=style.CRANK, zorder=5, label="best, as on the left"
         )
-        scale.grid(False)
-        for axis in (left, right):
-            axis.set_aspect("equal", adjustable="box")
-            axis.set_xlabel("x [mm]")
-            axis.set_ylabel("y [mm]")
-            axis.set_xlim(low.real, high.real)
-            axis.set_ylim(low.imag, high.imag)
-        number = f"{int(found.sound.sum())} of {found.sound.size - len(found.sound)} pairs of links are sound four-bars"
-        style.write_title(figure, f"{title}: {number}".removeprefix(": "))
-        return place_marks(style.finish(figure))
+    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    scale = right.inset_axes((1.03, 0.0, 0.05, 1.0))
+    figure.colorbar(dots, cax=scale, label="pivot of the crank: least transmission angle\nwith the best rocker [deg]")
+    scale.grid(False)
+    for axis in (left, right):
+        style.use_one_scale(axis, "box")
+        axis.set(xlim=(low.real, high.real), ylim=(low.imag, high.imag))
+    number = f"{int(found.sound.sum())} of {found.sound.size - len(found.sound)} pairs of links are sound four-bars"
+    return place_marks(style.finish(figure, f"{title}: {number}".removeprefix(": ")))
 
 
 def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -139,10 +124,7 @@ def _view(found: GuidanceMap) -> tuple[complex, complex]:
     held = [middle - 0.5 * VIEW * size * (1 + 1j), middle + 0.5 * VIEW * size * (1 + 1j)]
     if found.solutions:
         held += _pins(found.solutions[0]).values()
-    low, high = (
-        complex(min(z.real for z in held), min(z.imag for z in held)),
-        complex(max(z.real for z in held), max(z.imag for z in held)),
-    )
+    low, high = (complex(end(z.real for z in held), end(z.imag for z in held)) for end in (min, max))
     half = 0.53 * max((high - low).real, (high - low).imag) * (1 + 1j)
     return 0.5 * (low + high) - half, 0.5 * (low + high) + half
 
@@ -192,9 +174,3 @@ def _verdict(solution: Solution) -> str:
     angle = degrees(min(v.least_transmission, np.pi - v.greatest_transmission))
     wrong = ", ".join(defect.removesuffix(" defect") for defect in v.defects)
     return f"{v.grashof}\n" + (f"defects: {wrong}" if wrong else f"sound, {angle:.0f} deg from a dead centre")
-
-
-def _set_equal_scale(axis: Axes) -> None:
-    axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("y [mm]")

@@ -82,7 +82,7 @@ def to_plotly(picture: Picture) -> dict[str, Any]:
         axes = _Axes(figure, number)
         _add_part(part, axes)
         if not picture.heights or number + columns >= len(picture.parts):
-            axes.x["title"] = {"text": _line(_panel(part).x_label)}
+            axes.x["title"] = {"text": _line(getattr(part, "panel", part).x_label)}
     return {"data": figure.traces, "layout": figure.layout, "config": {"displaylogo": False}}
 
 
@@ -106,16 +106,8 @@ class _Figure:
             "legend": {"groupclick": "toggleitem", "tracegroupgap": 14},
             "shapes": [],
             "annotations": [
-                {
-                    "text": escape(note),
-                    "xref": "paper",
-                    "yref": "paper",
-                    "x": 0,
-                    "y": 0,
-                    "yshift": -20 * n,
-                    "showarrow": False,
-                }
-                | {"xanchor": "left", "yanchor": "top"}
+                {"text": escape(note), "xref": "paper", "yref": "paper", "x": 0, "y": 0, "yshift": -20 * n}
+                | {"showarrow": False, "xanchor": "left", "yanchor": "top"}
                 for n, note in enumerate(picture.notes)
             ],
         }
@@ -164,10 +156,6 @@ class _Axes:
         )
 
 
-def _panel(part: Any) -> Panel:
-    return part if isinstance(part, Panel) else part.panel
-
-
 def _line(text: str) -> str:
     """Return a label on one line, escaped for HTML."""
     return escape(text.replace("\n", " "))
@@ -212,21 +200,14 @@ def _(panel: Panel, axes: _Axes) -> None:
             trace["showlegend"] = False
         axes.add_trace(**trace, **legend)
     for name, number, those in shades_by_label(panel):
+        look = {"type": "rect", "fillcolor": SHADES[number][0], "opacity": 0.18, "line": {"width": 0}, "layer": "below"}
         for n, shade in enumerate(those):
-            look = {
-                "type": "rect",
-                "fillcolor": SHADES[number][0],
-                "opacity": 0.18,
-                "line": {"width": 0},
-                "layer": "below",
-            }
             entry = {"showlegend": True, "name": escape(name)} | legend if name and not n else {}
             axes.add_shape(shade.low, shade.high, **look, **entry)
-    logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
 
     def axis_value(axis: str, value: float) -> float:
         """Return a value as Plotly expects it in annotations and ranges: its logarithm if the axis is logarithmic."""
-        return log10(value) if logarithmic[axis] else value
+        return log10(value) if axis in panel.logarithmic else value
 
     for arrow in panel.arrows:
         x, begin, end = axis_value("x", arrow.x), axis_value("y", arrow.begin), axis_value("y", arrow.end)
@@ -236,16 +217,14 @@ def _(panel: Panel, axes: _Axes) -> None:
     for label in panel.labels:
         # of two labels near each other the higher one has its text above the other's
         level = sum(bool(abs(other.x - label.x) < close and other.y < label.y) for other in panel.labels)
-        text_at = {"ax": 45, "ay": -_ABOVE - _LINE_HEIGHT * level}
-        axes.add_arrow(
-            axis_value("x", label.x), axis_value("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1
-        )
+        look = {"ax": 45, "ay": -_ABOVE - _LINE_HEIGHT * level, "arrowhead": 0, "arrowwidth": 1}
+        axes.add_arrow(axis_value("x", label.x), axis_value("y", label.y), label.text, **look)
     for text, place in (panel.verticals or {}).items():
         axes.add_shape(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
     for place in panel.dashed:
         axes.add_shape(place, place, type="line", line={"dash": "dash", "width": 1})
     for axis, axes_entry, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
-        axes_entry |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
+        axes_entry |= {"type": "log", "exponentformat": "power", "dtick": 1} if axis in panel.logarithmic else {}
         axes_entry |= {"range": [axis_value(axis, v) for v in span]} if span is not None else {}
     axes.y["title"] = {"text": _line(panel.y_label)}
     if panel.x_ticks is not None:

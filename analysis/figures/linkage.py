@@ -20,21 +20,10 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..run import Trajectory
 from ..units import CM_PER_METRE
-from . import style
+from . import style, symbols
 from .animation import check_frames, gif
-from .dispatch import draw_mechanism, last_samples, plot
+from .dispatch import last_samples, plot
 from .marks import roomiest_position
-from .symbols import (
-    CENTRE_LINE,
-    draw_bearing,
-    draw_block,
-    draw_damper,
-    draw_ground,
-    draw_line,
-    draw_link,
-    draw_pin,
-    draw_spring,
-)
 
 #: Least angle (deg) between the letter of the crank angle and the ground link, so that the crank does not cover it.
 _LEAST_TURN = 32.0
@@ -122,31 +111,33 @@ class _Scene:
             self._letters(axis, q)
 
     def _ground(self, axis: Axes) -> None:
-        draw_line(axis, [np.zeros(2), self.zero], **CENTRE_LINE)
-        draw_bearing(axis, np.zeros(2), self.unit)
+        symbols.draw_line(axis, [np.zeros(2), self.zero], **symbols.CENTRE_LINE)
+        symbols.draw_bearing(axis, np.zeros(2), self.unit)
         # the guide, below the slider, and the wall at its end
-        draw_ground(axis, *self.rail, self.unit, zorder=1)
+        symbols.draw_ground(axis, *self.rail, self.unit, zorder=1)
         if self.sprung or self.damped:
-            draw_ground(axis, self.point(self.wall, -self.unit), self.point(self.wall, 1.5 * self.unit), self.unit)
+            symbols.draw_ground(
+                axis, self.point(self.wall, -self.unit), self.point(self.wall, 1.5 * self.unit), self.unit
+            )
 
     def _slider(self, axis: Axes, q: _Pins) -> None:
         unit, start = self.unit, q.u + 1.5 * self.unit
-        draw_block(axis, self.point(q.u, 0.0), self.along, unit)
+        symbols.draw_block(axis, self.point(q.u, 0.0), self.along, unit)
         side = 0.55 * unit if self.sprung and self.damped else 0.0
         if self.sprung:
-            draw_spring(axis, self.point(start, side), self.point(self.wall, side), unit)
+            symbols.draw_spring(axis, self.point(start, side), self.point(self.wall, side), unit)
         if self.damped:
-            draw_damper(axis, self.point(start, -side), self.point(self.wall, -side), unit)
+            symbols.draw_damper(axis, self.point(start, -side), self.point(self.wall, -side), unit)
 
     def _links(self, axis: Axes, q: _Pins) -> None:
         a, traced = np.zeros(2), bool(self.parameters.coupler_point_distance)
-        draw_link(axis, [q.d, q.c], style.ROCKER, zorder=5)
-        draw_link(axis, [q.b, q.c, *([q.p] if traced else [])], style.COUPLER)
-        draw_link(axis, [a, q.b], style.CRANK, zorder=7)
+        symbols.draw_link(axis, [q.d, q.c], style.ROCKER, zorder=5)
+        symbols.draw_link(axis, [q.b, q.c, *([q.p] if traced else [])], style.COUPLER)
+        symbols.draw_link(axis, [a, q.b], style.CRANK, zorder=7)
         for pin in (a, q.b, q.c, q.d):
-            draw_pin(axis, pin, self.unit)
+            symbols.draw_pin(axis, pin, self.unit)
         if traced:
-            draw_pin(axis, q.p, self.unit, style.TRACE, zorder=10)
+            symbols.draw_pin(axis, q.p, self.unit, style.TRACE, zorder=10)
 
     def _letters(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
@@ -178,7 +169,9 @@ class _Scene:
         # the slider position
         level = -2.35 * unit
         for s in {0.0, q.u}:
-            draw_line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=style.HAIR)
+            symbols.draw_line(
+                axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=style.HAIR
+            )
         if abs(q.u) > 1.2 * unit:
             arrow = {"arrowstyle": "-|>", "color": style.GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": style.HAIR}
             axis.annotate("", tuple(self.point(q.u, level)), tuple(self.point(0.0, level)), arrowprops=arrow)
@@ -199,6 +192,7 @@ class _Scene:
 
 
 @plot.register
+@style.figure_style()
 def draw_linkage(
     parameters: FiveBarParameters,
     crank_angle: float,
@@ -227,18 +221,16 @@ def draw_linkage(
     path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
     scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
     width, height = scene.high - scene.low
-    with style.figure_style():
-        figure = style.Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
-        axis = figure.subplots()
-        style.frame_drawing(axis, scene.low, scene.high)
-        scene.draw(axis, q, trace=path)
-        if title:
-            axis.set_title(title, fontsize=style.TITLE, fontweight="bold")
-        return style.finish(figure)
+    figure = style.Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
+    axis = figure.subplots()
+    style.frame_drawing(axis, scene.low, scene.high)
+    scene.draw(axis, q, trace=path)
+    if title:
+        axis.set_title(title, fontsize=style.TITLE, fontweight="bold")
+    return style.finish(figure)
 
 
-@draw_mechanism.register
-def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -> str:
+def draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -> str:
     """Draw a five-bar at the start of a run with the path of P, or of C if P coincides with B; return the caption."""
     shown = np.linspace(0, len(run) - 1, min(len(run), _FRAMED)).astype(int)
     configurations = [_pins(parameters, run["crank.angle"][i], run["slider.position"][i]) for i in shown]
@@ -255,6 +247,7 @@ def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -
     return f"at {run.time[0]:.4g} s, with the path of {name} {when}"
 
 
+@style.figure_style()
 def animate_linkage(
     parameters: FiveBarParameters,
     trajectory: Trajectory,
@@ -292,21 +285,20 @@ def animate_linkage(
     configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
-    with style.figure_style():
-        figure = style.Figure(figsize=(5.0, 5.0 * height / width + 1.9))
-        above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
-        style.write_title(figure, title)
-        below.plot(time, u, color="0.8")
-        (done,) = below.plot([], [], color=style.SLIDER)
-        (dot,) = below.plot([], [], "o", color=style.SLIDER, markersize=style.DOT)
-        below.set_xlabel("time [s]")
-        below.set_ylabel("slider position [mm]")
-        with gif(figure, path, frames_per_second) as (file, add_frame):
-            for i, q in zip(chosen, configurations):
-                above.clear()
-                style.frame_drawing(above, scene.low, scene.high)
-                scene.draw(above, q, letters=False, trace=trace[: i + 1])
-                done.set_data(time[: i + 1], u[: i + 1])
-                dot.set_data(time[i : i + 1], u[i : i + 1])
-                add_frame()
+    figure = style.Figure(figsize=(5.0, 5.0 * height / width + 1.9))
+    above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
+    style.write_title(figure, title)
+    below.plot(time, u, color="0.8")
+    (done,) = below.plot([], [], color=style.SLIDER)
+    (dot,) = below.plot([], [], "o", color=style.SLIDER, markersize=style.DOT)
+    below.set_xlabel("time [s]")
+    below.set_ylabel("slider position [mm]")
+    with gif(figure, path, frames_per_second) as (file, add_frame):
+        for i, q in zip(chosen, configurations):
+            above.clear()
+            style.frame_drawing(above, scene.low, scene.high)
+            scene.draw(above, q, letters=False, trace=trace[: i + 1])
+            done.set_data(time[: i + 1], u[: i + 1])
+            dot.set_data(time[i : i + 1], u[i : i + 1])
+            add_frame()
     return file

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from shapely import LineString, distance
 from shapely import points as make_points
@@ -31,7 +30,7 @@ from ..periodic import (
 )
 from ..units import display_scale
 from ..youssef import Approximations
-from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, register_picture
+from .curves import Arrow, Curve, Label, Panel, Picture, Shade, drawn, register_picture
 from .style import COLOURS, LINE, THIN, name_in_words
 
 #: Line styles of the approximations, and of motions by their stability.
@@ -102,14 +101,15 @@ class _Scale:
         return f"{self.scale * value:.4g}"
 
 
-def plot_branches(
+def describe_branches(
     branches: Sequence[Branch],
     *,
     title: str = "",
     rpm: bool = True,
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[AvoidedRange] = (),
-) -> Figure:
+    caution: str = "",
+) -> Picture:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
     At folds an arrow leads to the motion that the machine jumps to. A panel shows the relative errors of the approximations.
@@ -127,20 +127,9 @@ def plot_branches(
         metres, shape (k,), by its name. The errors are relative to the stable motions with a period of one crank turn.
     avoid : sequence of AvoidedRange
         Ranges of the parameter to shade.
+    caution : str
+        Line above the legend on limits of the shaded ranges.
     """
-    return draw(describe_branches(branches, title=title, rpm=rpm, beside=beside, avoid=avoid))
-
-
-def describe_branches(
-    branches: Sequence[Branch],
-    *,
-    title: str = "",
-    rpm: bool = True,
-    beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
-    avoid: Sequence[AvoidedRange] = (),
-    caution: str = "",
-) -> Picture:
-    """Return the picture that `plot_branches` draws; ``caution`` is a line above the legend on limits of the shaded ranges."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     unit, factor = display_scale(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
     shown, scale = display_scale(si)
@@ -164,6 +153,9 @@ def describe_branches(
     panels += _loads(branches, look, bare)
     heights += [1.0] * (len(panels) - len(heights))
     return Picture(parts=panels, title=title, size=_SIZE, heights=heights)
+
+
+plot_branches = drawn(describe_branches)
 
 
 def _amplitudes(

@@ -17,7 +17,7 @@ from linkwork.variables import UNITS, Variable
 from ..mechanisms import MECHANISMS, find_mechanism, wrapping_outputs
 from ..run import Ensemble, Trajectory
 from . import style
-from .dispatch import draw_mechanism, has_picture, plot
+from .dispatch import mechanism_drawer, plot
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -50,9 +50,8 @@ class _Rows:
 
 
 @plot.register
-def plot_outputs(
-    run: Trajectory, names: Sequence[str] | None = None, *, columns: int = 1, title: str = ""
-) -> style.Figure:
+@style.figure_style()
+def plot_outputs(run: Trajectory, names: Sequence[str] | None = None, *, title: str = "") -> style.Figure:
     """Plot a run: outputs over time, and the mechanism at the start with the paths of its points.
 
     Lengths are in mm, angles in degrees and speeds in rpm, by the units of the mechanism's table of variables.
@@ -63,53 +62,49 @@ def plot_outputs(
     names : sequence of str, optional
         Outputs to plot, one panel each, without the mechanism. By default coordinates, drives and magnitudes of the joint
         forces are plotted; constant outputs are left out and stated at the foot.
-    columns : int
-        Panels side by side.
     title : str
     """
-    table, picture = _variables(run), False
+    table, drawer = _variables(run), None
     notes: list[str] = []
     if names is None:
         panels, notes = _without_constants(_default_rows(run, table))
-        picture = run.parameters is not None and len(run) > 0 and has_picture(run.parameters)
+        drawer = mechanism_drawer(run.parameters) if len(run) > 0 else None
     else:
         panels = [_output_row(run, table, name) for name in names]
     if run.status:
         notes.append(f"The run ended early: {run.message}.")
     elif run.message:
         notes.append(f"Note: {run.message}.")
-    with style.figure_style():
-        grid = _picture_grid(len(panels)) if picture else _column_grid(len(panels), columns)
-        width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)
-        figure = style.Figure(figsize=(width, 1.0 + height * len(grid)))
-        cells = figure.add_gridspec(*grid.shape)
+    grid = _picture_grid(len(panels)) if drawer else np.arange(len(panels))[:, None]
+    width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if drawer else (_WIDTH, _HEIGHT)
+    figure = style.Figure(figsize=(width, 1.0 + height * len(grid)))
+    cells = figure.add_gridspec(*grid.shape)
 
-        def place(number: int, **options: Any) -> Axes:
-            rows, places = np.nonzero(grid == number)
-            return figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
+    def place(number: int, **options: Any) -> Axes:
+        rows, places = np.nonzero(grid == number)
+        return figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
 
-        axes: list[Axes] = []
-        for number, panel in enumerate(panels):
-            axes.append(place(number, sharex=axes[0] if axes else None))
-            _draw(axes[-1], run.time, panel)
-        for column in grid.T.tolist():
-            of_panels = [axes[number] for number in dict.fromkeys(column) if number in range(len(panels))]
-            for axis in of_panels[:-1]:
-                axis.tick_params(labelbottom=False)
-            for axis in of_panels[-1:]:
-                axis.set_xlabel("time [s]")
-            figure.align_ylabels(of_panels)
-        if picture:
-            axis = place(_DRAWN)
-            axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=style.SMALL, color=style.MARKED)
-        style.write_title(figure, title)
-        if any(is_fast(values) for panel in panels for values in panel.curves.values()):
-            notes.append(BANDS)
-        style.write_notes(figure, notes)
-        return style.finish(figure)
+    axes: list[Axes] = []
+    for number, panel in enumerate(panels):
+        axes.append(place(number, sharex=axes[0] if axes else None))
+        _draw(axes[-1], run.time, panel)
+    for column in grid.T.tolist():
+        of_panels = [axes[number] for number in dict.fromkeys(column) if number in range(len(panels))]
+        for axis in of_panels[:-1]:
+            axis.tick_params(labelbottom=False)
+        for axis in of_panels[-1:]:
+            axis.set_xlabel("time [s]")
+        figure.align_ylabels(of_panels)
+    if drawer:
+        axis = place(_DRAWN)
+        axis.set_title(drawer(run.parameters, axis, run), fontsize=style.SMALL, color=style.MARKED)
+    if any(is_fast(values) for panel in panels for values in panel.curves.values()):
+        notes.append(BANDS)
+    return style.finish(figure, title, notes)
 
 
 @plot.register
+@style.figure_style()
 def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: str = "") -> style.Figure:
     """Plot many runs: the median of outputs over time, and the ranges in which 90 % of the runs and all runs are.
 
@@ -129,41 +124,32 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
     known = {v.name: v for v in mechanism.variables}
     missing = int(np.count_nonzero(runs.status))
     notes = [f"{len(runs):,} runs" + (f"; ended early, and left out from there on: {missing:,}." if missing else ".")]
-    with style.figure_style():
-        figure = style.Figure(figsize=(_WIDTH, 1.0 + 1.6 * _HEIGHT * len(names)))
-        axes = np.ravel(figure.subplots(len(names), 1, sharex=True))
-        for axis, name in zip(axes, names):
-            values = np.ma.filled(runs.output(name), np.nan)
-            if name in wrapping_outputs():
-                for row, count, i in zip(values, runs.counts.tolist(), range(len(runs))):
-                    row[:count] = runs[i].unwrapped(name)
-            unit, factor = display_unit(known[name])
-            reached = ~np.isnan(values).all(axis=0)
-            least, low, median, high, greatest = factor * np.nanpercentile(
-                values[:, reached], (0.0, 5.0, 50.0, 95.0, 100.0), axis=0
-            )
-            time, shade = runs.time[reached], {"color": style.COLOURS[0], "linewidth": 0.0}
-            axis.fill_between(time, least, greatest, alpha=0.15, label="all runs", **shade)
-            axis.fill_between(time, low, high, alpha=0.3, label="90 % of the runs", **shade)
-            axis.plot(time, median, color=style.COLOURS[0], label="median")
-            bottom, top = low.min(initial=np.inf), high.max(initial=-np.inf)
-            ends = least.min(initial=np.inf), greatest.max(initial=-np.inf)
-            if 0.0 < _FAR * (top - bottom) < ends[1] - ends[0]:
-                axis.set_ylim(bottom - (top - bottom), top + (top - bottom))
-                notes.append(f"{name} is {ends[0]:.4g} to {ends[1]:.4g} {unit} in all runs, which is cut off.")
-            axis.set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
-        style.legend_above(axes[0])
-        axes[-1].set_xlabel("time [s]")
-        figure.align_ylabels(axes)
-        style.write_title(figure, title)
-        style.write_notes(figure, notes)
-        return style.finish(figure)
-
-
-def _column_grid(count: int, columns: int) -> NDArray[np.int64]:
-    """Return the grid of panel indices row by row, shape (rows, columns); indices from ``count`` on have no panel."""
-    rows = ceil(count / columns)
-    return np.arange(rows * columns).reshape(rows, columns)
+    figure = style.Figure(figsize=(_WIDTH, 1.0 + 1.6 * _HEIGHT * len(names)))
+    axes = np.ravel(figure.subplots(len(names), 1, sharex=True))
+    for axis, name in zip(axes, names):
+        values = np.ma.filled(runs.output(name), np.nan)
+        if name in wrapping_outputs():
+            for row, count, i in zip(values, runs.counts.tolist(), range(len(runs))):
+                row[:count] = runs[i].unwrapped(name)
+        unit, factor = display_unit(known[name])
+        reached = ~np.isnan(values).all(axis=0)
+        least, low, median, high, greatest = factor * np.nanpercentile(
+            values[:, reached], (0.0, 5.0, 50.0, 95.0, 100.0), axis=0
+        )
+        time, shade = runs.time[reached], {"color": style.COLOURS[0], "linewidth": 0.0}
+        axis.fill_between(time, least, greatest, alpha=0.15, label="all runs", **shade)
+        axis.fill_between(time, low, high, alpha=0.3, label="90 % of the runs", **shade)
+        axis.plot(time, median, color=style.COLOURS[0], label="median")
+        bottom, top = low.min(initial=np.inf), high.max(initial=-np.inf)
+        ends = least.min(initial=np.inf), greatest.max(initial=-np.inf)
+        if 0.0 < _FAR * (top - bottom) < ends[1] - ends[0]:
+            axis.set_ylim(bottom - (top - bottom), top + (top - bottom))
+            notes.append(f"{name} is {ends[0]:.4g} to {ends[1]:.4g} {unit} in all runs, which is cut off.")
+        axis.set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
+    style.legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
+    return style.finish(figure, title, notes)
 
 
 def _picture_grid(count: int) -> NDArray[np.int64]:
@@ -298,6 +284,7 @@ def _constant_text(values: FloatArray) -> str:
     return f"{mean:.4g}" if abs(mean) > _STILL else "0"
 
 
+@style.figure_style()
 def plot_comparison(
     first: Trajectory,
     second: Trajectory,
@@ -328,27 +315,26 @@ def plot_comparison(
     ]
     said = [_rounding_text(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
     beside = not all(said)
-    with style.figure_style():
-        figure = style.Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
-        rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
-        for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
-            for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
-                axes[0].plot(time, values, line, color=colour, label=label)
-            axes[0].set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
-            if beside:
-                _draw_difference(axes[1], time, b - a, unit, size)
-        style.legend_above(rows[0, 0])
+    figure = style.Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
+    rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
+    for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
+        for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
+            axes[0].plot(time, values, line, color=colour, label=label)
+        axes[0].set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
         if beside:
-            rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
-        else:
-            each = ", ".join(f"{style.name_in_words(name)} by {size}" for name, size in zip(names, said) if size != "0")
-            apart = f"differ by rounding only: {each} at most" if each else "are identical"
-            style.write_notes(figure, [f"{labels[0]} and {labels[1]} {apart}."])
-        for axis in rows[-1]:
-            axis.set_xlabel("time [s]")
-        style.write_title(figure, title)
-        figure.align_ylabels()
-        return style.finish(figure)
+            _draw_difference(axes[1], time, b - a, unit, size)
+    style.legend_above(rows[0, 0])
+    notes: list[str] = []
+    if beside:
+        rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
+    else:
+        each = ", ".join(f"{style.name_in_words(name)} by {size}" for name, size in zip(names, said) if size != "0")
+        apart = f"differ by rounding only: {each} at most" if each else "are identical"
+        notes = [f"{labels[0]} and {labels[1]} {apart}."]
+    for axis in rows[-1]:
+        axis.set_xlabel("time [s]")
+    figure.align_ylabels()
+    return style.finish(figure, title, notes)
 
 
 def _side_by_side(first: Trajectory, second: Trajectory, name: str, n: int) -> tuple[FloatArray, FloatArray]:

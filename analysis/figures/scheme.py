@@ -17,38 +17,15 @@ from linkwork.parameters import field_name
 from ..linkages import Reach, reach
 from ..mechanisms import find_mechanism
 from ..run import Trajectory
+from . import style, symbols
 from .animation import check_frames, gif
 from .dispatch import animate, last_samples, plot
 from .marks import roomiest_position
-from .style import (
-    COLOURS,
-    COUPLER,
-    CRANK,
-    MARKED,
-    ROCKER,
-    SMALL,
-    THIN,
-    TRACE,
-    Figure,
-    figure_style,
-    finish,
-    write_title,
-)
-from .symbols import (
-    CENTRE_LINE,
-    draw_bearing,
-    draw_block,
-    draw_damper,
-    draw_line,
-    draw_link,
-    draw_pin,
-    draw_spring,
-)
 
 Array = NDArray[np.float64]
 _SIDE = 5.0
 #: Colours of links by name; other links have the other colours of curves in turn.
-_NAMED = {"crank": CRANK, "coupler": COUPLER, "rod": COUPLER, "rocker": ROCKER}
+_NAMED = {"crank": style.CRANK, "coupler": style.COUPLER, "rod": style.COUPLER, "rocker": style.ROCKER}
 #: Number of configurations along a path.
 _TRACED = 240
 
@@ -85,9 +62,9 @@ def draw(
     everything = np.concatenate(list(positions.values()))
     unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0)))
     for name in drawing.paths:
-        axis.plot(*positions[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
-    taken = {TRACE, *(_NAMED[part.text] for part in drawing.parts if part.text in _NAMED)}
-    others = cycle(colour for colour in dict.fromkeys((*_NAMED.values(), *COLOURS)) if colour not in taken)
+        axis.plot(*positions[name][1:].T, color=style.TRACE, linewidth=style.THIN, zorder=2)
+    taken = {style.TRACE, *(_NAMED[part.text] for part in drawing.parts if part.text in _NAMED)}
+    others = cycle(colour for colour in dict.fromkeys((*_NAMED.values(), *style.COLOURS)) if colour not in taken)
     drawn = [p for p in drawing.parts if not p.where or getattr(parameters, field_name(p.where), 0.0) != 0.0]
     damped = {part.joints for part in drawn if part.kind == "damper"}
     for part in drawn:
@@ -107,13 +84,11 @@ def draw(
     carried = [name for part in drawing.parts if part.kind == "link" for name in part.joints]
     for name, pin in pins.items():
         marked = name in drawing.paths and carried.count(name) < 2
-        draw_pin(axis, pin, unit, TRACE if marked else "white", zorder=10.0 if marked else 9.0)
+        symbols.draw_pin(axis, pin, unit, style.TRACE if marked else "white", zorder=10.0 if marked else 9.0)
     if letters:
         _write_letters(axis, pins, unit)
-    axis.set_aspect("equal", adjustable="datalim")
+    style.use_one_scale(axis)
     axis.margins(0.08)
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("y [mm]")
 
 
 def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
@@ -129,7 +104,14 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
         place = roomiest_position(pin, 1.7 * unit, drawn, taken)
         taken.append(place)
         axis.text(
-            float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
+            float(place[0]),
+            float(place[1]),
+            name,
+            fontsize=style.SMALL,
+            color=style.MARKED,
+            ha="center",
+            va="center",
+            zorder=7,
         )
 
 
@@ -137,18 +119,18 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
     """Draw a part; ``through`` are the positions of its joints (mm), ``unit`` the size of symbols (mm)."""
     first, last = through[0], through[-1]
     if part.kind == "link":
-        draw_link(axis, through, colour)
+        symbols.draw_link(axis, through, colour)
     elif part.kind == "pivot":
-        draw_bearing(axis, first, unit)
+        symbols.draw_bearing(axis, first, unit)
     elif part.kind == "slider":
-        draw_block(axis, first, (last - through[1]) / np.linalg.norm(last - through[1]), unit)
+        symbols.draw_block(axis, first, (last - through[1]) / np.linalg.norm(last - through[1]), unit)
     elif part.kind == "gear":
         # the radius to the second point, and the circle through it
         turns = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73)) * complex(*(last - first))
         rim = first + np.column_stack([turns.real, turns.imag])
-        draw_line(axis, np.vstack([first, rim]), color="0.5", linewidth=THIN, zorder=2)
+        symbols.draw_line(axis, np.vstack([first, rim]), color="0.5", linewidth=style.THIN, zorder=2)
     else:
-        draw_line(axis, [first, last], **CENTRE_LINE)
+        symbols.draw_line(axis, [first, last], **symbols.CENTRE_LINE)
 
 
 def _draw_suspension(axis: Axes, kind: str, paths: Sequence[Array], unit: float, side: float) -> None:
@@ -162,12 +144,12 @@ def _draw_suspension(axis: Axes, kind: str, paths: Sequence[Array], unit: float,
     across = unit * np.array([-along[1], along[0]])
     travel = np.nanmax((paths[0] - paths[1]) @ along) - (block - start) @ along
     wall = block + (travel + 8.0 * unit) * along
-    symbol, shift = (draw_spring, side * across) if kind == "spring" else (draw_damper, -side * across)
+    symbol, shift = (symbols.draw_spring, side * across) if kind == "spring" else (symbols.draw_damper, -side * across)
     symbol(axis, block + 1.5 * unit * along + shift, wall + shift, unit)
-    draw_line(axis, [wall - 1.3 * across, wall + 1.3 * across], zorder=3)
+    symbols.draw_line(axis, [wall - 1.3 * across, wall + 1.3 * across], zorder=3)
 
 
-def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
+def draw_at_start(parameters: Any, axis: Axes, run: Trajectory) -> str:
     """Draw a mechanism at the start of a run with the paths of its points, and return the caption."""
     mechanism = find_mechanism(parameters)
     samples, words = last_samples(run)
@@ -181,48 +163,41 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     return f"{mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
 
 
-def _swept_coordinates(mechanism: Mechanism, found: Reach) -> Array:
-    """Return coordinates (n, freedoms): the start, then the range of the first freedom with all others at their start."""
+def _swept_positions(mechanism: Mechanism, found: Reach) -> dict[str, Array]:
+    """Return positions of the joints: at the start, then over the range of the first freedom with all others at their start."""
     known = mechanism.first_set
     rows = np.tile(mechanism.state(known.initial)[: len(mechanism.freedoms)], (_TRACED + 1, 1))
     rows[1:, 0] = np.linspace(found.low, found.high, _TRACED)
-    return rows
+    return joint_positions(mechanism, known.parameters, rows)
 
 
 @plot.register
-def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
+@style.figure_style()
+def plot_scheme(mechanism: Mechanism, *, title: str = "") -> style.Figure:
     """Draw a planar mechanism at its start, and the paths of its points through the range of its first freedom."""
-    known = mechanism.first_set
-    with figure_style():
-        figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
-        axis = figure.add_subplot()
-        draw(
-            axis,
-            mechanism,
-            known.parameters,
-            joint_positions(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism))),
-        )
-        write_title(figure, title or mechanism.title)
-        return finish(figure)
+    figure = style.Figure(figsize=(1.3 * _SIDE, _SIDE))
+    at = _swept_positions(mechanism, reach(mechanism))
+    draw(figure.add_subplot(), mechanism, mechanism.first_set.parameters, at)
+    return style.finish(figure, title or mechanism.title)
 
 
-def plot_schemes(mechanisms: Sequence[Mechanism]) -> Figure:
+@style.figure_style()
+def plot_schemes(mechanisms: Sequence[Mechanism]) -> style.Figure:
     """Draw several planar mechanisms at their start, with the paths of their points through the range of the first freedom."""
     columns = 4
     rows = -(-len(mechanisms) // columns)
-    with figure_style():
-        figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
-        for number, mechanism in enumerate(mechanisms):
-            axis = figure.add_subplot(rows, columns, number + 1)
-            known = mechanism.first_set
-            at = joint_positions(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism)))
-            draw(axis, mechanism, known.parameters, at, letters=False)
-            axis.set_axis_off()
-            axis.set_title(mechanism.name, fontsize=SMALL)
-        return finish(figure)
+    figure = style.Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
+    for number, mechanism in enumerate(mechanisms):
+        axis = figure.add_subplot(rows, columns, number + 1)
+        at = _swept_positions(mechanism, reach(mechanism))
+        draw(axis, mechanism, mechanism.first_set.parameters, at, letters=False)
+        axis.set_axis_off()
+        axis.set_title(mechanism.name, fontsize=style.SMALL)
+    return style.finish(figure)
 
 
 @animate.register
+@style.figure_style()
 def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, title: str = "") -> Path:
     """Write an animation (GIF) of a planar mechanism over the range of its first freedom, back and forth if it cannot turn.
 
@@ -232,26 +207,23 @@ def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, 
         If there are fewer than two frames.
     """
     check_frames(frames)
-    known = mechanism.first_set
     found = reach(mechanism)
-    swept = _swept_coordinates(mechanism, found)[1:]
-    at = joint_positions(mechanism, known.parameters, swept)
-    order = np.linspace(0, len(swept) - 1, frames).astype(int)
+    at = {name: path[1:] for name, path in _swept_positions(mechanism, found).items()}
+    order = np.linspace(0, _TRACED - 1, frames).astype(int)
     if not found.turns:
         order = np.concatenate([order, order[::-1]])
     points = np.concatenate(list(at.values()))
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     room = 0.06 * float((high - low).max())
-    with figure_style():
-        figure = Figure(figsize=(_SIDE, _SIDE))
-        axis = figure.add_subplot()
-        with gif(figure, path, 25) as (file, add_frame):
-            for number in order:
-                axis.clear()
-                now = {name: np.concatenate([line[number : number + 1], line]) for name, line in at.items()}
-                draw(axis, mechanism, known.parameters, now, letters=False)
-                axis.set_aspect("equal", adjustable="box")
-                axis.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
-                axis.set_title(title or mechanism.title)
-                add_frame()
+    figure = style.Figure(figsize=(_SIDE, _SIDE))
+    axis = figure.add_subplot()
+    with gif(figure, path, 25) as (file, add_frame):
+        for number in order:
+            axis.clear()
+            now = {name: np.concatenate([line[number : number + 1], line]) for name, line in at.items()}
+            draw(axis, mechanism, mechanism.first_set.parameters, now, letters=False)
+            axis.set_aspect("equal", adjustable="box")
+            axis.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
+            axis.set_title(title or mechanism.title)
+            add_frame()
     return file

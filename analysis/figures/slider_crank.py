@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import erf, isfinite, sqrt
+from math import isfinite
 from textwrap import fill
 from typing import Any
 
@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, PercentFormatter
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from linkwork.errors import InputError
 
@@ -138,6 +139,7 @@ def _force_panel(
 
 
 @plot.register
+@style.figure_style()
 def plot_tolerances(
     found: MonteCarlo, quantity: str = "slider.position", angle: float = 0.0, *, units: str = "SI", title: str = ""
 ) -> Figure:
@@ -178,19 +180,17 @@ def plot_tolerances(
     foot = [f"{found.samples:,} samples at each angle; {lost if most else 'all can be assembled'}."]
     foot += [f"{note[0].upper()}{note[1:]}." for note in found.notes(units)]
     lines = sum(len(fill(note, _LETTERS).splitlines()) for note in foot) - 1
-    with style.figure_style():
-        figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines))
-        above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
-        band = above.subplots()
-        histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
-        _draw_band(band, found, quantity, index, factor)
-        _draw_histogram(histogram, found, quantity, index, unit, factor)
-        band.set_ylabel(f"error of {name} [{unit}]")
-        histogram.set_xlabel(f"error of {name} [{unit}]")
-        _draw_shares(bars, found, quantity, index)
-        style.write_notes(below, foot)
-        style.write_title(figure, title or f"Tolerances: {name}")
-        return style.finish(figure)
+    figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines))
+    above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
+    band = above.subplots()
+    histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
+    _draw_band(band, found, quantity, index, factor)
+    _draw_histogram(histogram, found, quantity, index, unit, factor)
+    band.set_ylabel(f"error of {name} [{unit}]")
+    histogram.set_xlabel(f"error of {name} [{unit}]")
+    _draw_shares(bars, found, quantity, index)
+    style.write_notes(below, foot)
+    return style.finish(figure, title or f"Tolerances: {name}")
 
 
 def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, index: int, factor: float) -> None:
@@ -254,8 +254,8 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, index: int, un
     # a distribution narrower than a bin is drawn as a line
     if deviation > width:
         fine = np.linspace(edges[0], edges[-1], 400)
-        curve = [_normal_share(x - 0.5 * width, x + 0.5 * width, deviation) for x in fine]
-        axis.plot(fine, curve, color=_LINEAR, label="linear estimate, normal")
+        share_of_bin = ndtr((fine + 0.5 * width) / deviation) - ndtr((fine - 0.5 * width) / deviation)
+        axis.plot(fine, share_of_bin, color=_LINEAR, label="linear estimate, normal")
         for place in (-3.0 * deviation, 3.0 * deviation):
             if edges[0] <= place <= edges[-1]:
                 axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=style.THIN, linestyle="--")
@@ -312,11 +312,6 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     axis.grid(visible=False, axis="y")
-
-
-def _normal_share(low: float, high: float, deviation: float) -> float:
-    """Return the probability that a normal variable of mean zero lies between two values."""
-    return 0.5 * (erf(high / (deviation * sqrt(2.0))) - erf(low / (deviation * sqrt(2.0))))
 
 
 def _number_text(value: float, digits: int = 3) -> str:

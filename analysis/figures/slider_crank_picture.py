@@ -35,7 +35,7 @@ from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shif
 from ..units import INCH
 from . import style
 from .animation import check_frames, gif
-from .dispatch import animate, draw_mechanism, last_samples, plot
+from .dispatch import animate, last_samples, plot
 from .solids import ball, box, cylinder, paint
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -346,6 +346,7 @@ class _Scene:
 
 
 @plot.register
+@style.figure_style(laid_out=False)
 def plot_mechanism(
     parameters: SliderCrankParameters,
     crank_angle: float,
@@ -384,15 +385,12 @@ def plot_mechanism(
     pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
     parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
     scene = _Scene(parameters, parts, [pose], unit, view)
-    with style.figure_style(laid_out=False):
-        figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
-        scene.draw(axis, pose)
-        style.write_title(figure, title)
-        return style.finish(figure)
+    figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
+    scene.draw(axis, pose)
+    return style.finish(figure, title)
 
 
-@draw_mechanism.register
-def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory) -> str:
+def draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory) -> str:
     """Draw the slider-crank at the start of a run with the paths of both pins, and return the caption."""
     factor = UNITS["mm"]
     shown = np.linspace(0, len(run) - 1, min(len(run), _POINTS)).astype(int)
@@ -420,6 +418,7 @@ def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tup
 
 
 @animate.register
+@style.figure_style(laid_out=False)
 def animate_mechanism(
     parameters: SliderCrankParameters,
     path: str | Path,
@@ -467,21 +466,20 @@ def animate_mechanism(
     poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
     parts = _parts(parameters, law, factor)
     scene = _Scene(parameters, parts, poses, unit, view)
-    with style.figure_style(laid_out=False):
-        head, foot = (0.35 if title else 0.0), 1.6
-        figure, above = _sheet(scene, 7.0, head=head, foot=foot)
-        total = figure.get_figheight()
-        below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
-        style.write_title(figure, title)
-        _plot_slider_position(below, parts, unit)
-        (dot,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=7)
-        with gif(figure, path, frames_per_second) as (file, add_frame):
-            for pose in poses:
-                scene.draw(above, pose, letters=False)
-                dot.set_data([degrees(pose.angle)], [pose.slide])
-                add_frame()
-                for artist in (*above.lines, *above.collections):
-                    artist.remove()
+    head, foot = (0.35 if title else 0.0), 1.6
+    figure, above = _sheet(scene, 7.0, head=head, foot=foot)
+    total = figure.get_figheight()
+    below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
+    style.write_title(figure, title)
+    _plot_slider_position(below, parts, unit)
+    (dot,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=7)
+    with gif(figure, path, frames_per_second) as (file, add_frame):
+        for pose in poses:
+            scene.draw(above, pose, letters=False)
+            dot.set_data([degrees(pose.angle)], [pose.slide])
+            add_frame()
+            for artist in (*above.lines, *above.collections):
+                artist.remove()
     return file
 
 
@@ -499,6 +497,7 @@ def _plot_slider_position(axis: Axes, parts: Sequence[_Part], unit: str) -> None
     axis.set_ylabel(f"slider position [{unit}]")
 
 
+@style.figure_style()
 def plot_range(
     parameters: SliderCrankParameters, *, law: PeriodicShift | None = None, unit: str = "mm", title: str = ""
 ) -> Figure:
@@ -530,28 +529,26 @@ def plot_range(
     angles = np.linspace(min(ends), max(ends), 2 * _POINTS)
     square = np.array([kinematics.assembly_square(float(a), law.at(float(a))[0], p) for a in angles])
     margin = factor * (p.a2 - np.sqrt(p.a2 * p.a2 - square))
-    with style.figure_style():
-        figure = Figure(figsize=(9.6, 4.4))
-        panels = figure.subplot_mosaic(
-            [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
-        )
-        _draw_circle(panels["circle"], parts, factor * p.a1, unit)
-        upper = panels["margin"]
-        missing: dict[str, Any] = {"where": (margin < 0.0).tolist(), "label": "the rod does not reach the guide"}
-        upper.fill_between(np.degrees(angles), margin, 0.0, color="0.85", linewidth=0.0, **missing)
-        if margin.min() < 0.0:
-            style.legend_above(upper)
-        upper.plot(np.degrees(angles), margin, color=style.COLOURS[0])
-        upper.axhline(0.0, color="0.3", linewidth=style.HAIR)
-        upper.set_ylabel(f"assembly margin [{unit}]")
-        upper.sharex(panels["slider"])
-        _plot_slider_position(panels["slider"], parts, unit)
-        for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
-            for axis in (upper, panels["slider"]):
-                axis.axvline(angle, color=_LIMIT, linewidth=style.THIN, linestyle="--", zorder=1)
-        style.write_title(figure, title)
-        figure.align_ylabels([upper, panels["slider"]])
-        return style.finish(figure)
+    figure = Figure(figsize=(9.6, 4.4))
+    panels = figure.subplot_mosaic(
+        [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
+    )
+    _draw_circle(panels["circle"], parts, factor * p.a1, unit)
+    upper = panels["margin"]
+    missing: dict[str, Any] = {"where": (margin < 0.0).tolist(), "label": "the rod does not reach the guide"}
+    upper.fill_between(np.degrees(angles), margin, 0.0, color="0.85", linewidth=0.0, **missing)
+    if margin.min() < 0.0:
+        style.legend_above(upper)
+    upper.plot(np.degrees(angles), margin, color=style.COLOURS[0])
+    upper.axhline(0.0, color="0.3", linewidth=style.HAIR)
+    upper.set_ylabel(f"assembly margin [{unit}]")
+    upper.sharex(panels["slider"])
+    _plot_slider_position(panels["slider"], parts, unit)
+    for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
+        for axis in (upper, panels["slider"]):
+            axis.axvline(angle, color=_LIMIT, linewidth=style.THIN, linestyle="--", zorder=1)
+    figure.align_ylabels([upper, panels["slider"]])
+    return style.finish(figure, title)
 
 
 def _draw_circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:

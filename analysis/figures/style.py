@@ -32,14 +32,8 @@ TARGET, SHADE, MARKED = "#E69F00", "#56B4E9", "0.25"
 
 #: Light colours of classes of points.
 LIGHT = ("#C6DFF0", "#F6C99F", "#A8DDB5", "#E7B9D6", "#F2E394", "#E0E0E0")
-#: Shades of ranges in order: colour, Matplotlib's hatching, Plotly's hatching.
-SHADES = (
-    ("#E69F00", "", ""),
-    ("#56B4E9", "//", "/"),
-    ("#009E73", "..", "."),
-    ("#D55E00", "xx", "x"),
-    ("#CC79A7", "\\\\", "\\"),
-)
+#: Shades of ranges in order: colour and Matplotlib's hatching.
+SHADES = (("#E69F00", ""), ("#56B4E9", "//"), ("#009E73", ".."), ("#D55E00", "xx"), ("#CC79A7", "\\\\"))
 
 #: Font sizes (points): figure titles, drawings, titles of panels and axes, legends and notes, marks in a panel.
 TITLE, LETTER, PLAIN, SMALL, TINY = 10.5, 10.5, 9.0, 8.0, 7.5
@@ -116,11 +110,13 @@ def legend_above(axis: Axes, **options: Any) -> None:
     axis.legend(**where | {"borderpad": 0.2, "columnspacing": 1.2} | options)
 
 
-def finish(figure: Figure) -> Figure:
-    """Lay out the figure, fix the layout and return it.
+def finish(figure: Figure, title: str = "", notes: Sequence[str] = ()) -> Figure:
+    """Write title and notes, lay out the figure, fix the layout and return the figure.
 
     Call it inside `figure_style`: Matplotlib creates the ticks, and gives them their style, only at the layout.
     """
+    write_title(figure, title)
+    write_notes(figure, notes)
     engine = figure.get_layout_engine()
     if engine is None:
         figure.draw_without_rendering()
@@ -138,6 +134,12 @@ def frame_drawing(axis: Axes, low: Any, high: Any) -> None:
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])
     axis.set_axis_off()
+
+
+def use_one_scale(axis: Axes, adjustable: Any = "datalim") -> None:
+    """Give both axes of a drawing, in mm, the same scale; ``adjustable`` is that of Matplotlib's ``set_aspect``."""
+    axis.set_aspect("equal", adjustable=adjustable)
+    axis.set(xlabel="x [mm]", ylabel="y [mm]")
 
 
 def align_labels(axes: Sequence[Axes]) -> None:

@@ -22,7 +22,7 @@ from shapely import MultiLineString, MultiPoint
 from linkwork.errors import InputError
 
 from .. import synthesis as syn
-from ..units import ROUNDING
+from ..units import ROUNDING, display_scale
 from . import style
 from .animation import check_frames, gif
 from .dispatch import animate, plot
@@ -54,17 +54,12 @@ class _Frame:
         self.unit = self.extent / 42.0
         self.low, self.high = low - 3.0 * self.unit, high + 3.0 * self.unit
 
-    def prepare(self, axis: Axes) -> None:
-        _set_one_scale(axis, self.low, self.high)
-
 
 def _set_one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
     """Give both axes the same scale; the panel shows at least the box from ``low`` to ``high`` (mm)."""
     axis.update_datalim(np.array([low, high]))
     axis.margins(0.0)
-    axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("y [mm]")
+    style.use_one_scale(axis)
 
 
 def _draw_target(axis: Axes, scene: syn.LinkageScene, *, size: float = 3.0) -> None:
@@ -206,14 +201,6 @@ def _plot_magnified_errors(axis: Axes, scene: syn.LinkageScene) -> None:
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
-def _station_axis(scene: syn.LinkageScene) -> tuple[FloatArray, str]:
-    """Return the x coordinates of the stations (crank rotation or number), and the label of the x axis."""
-    rotation = np.degrees(scene.stations["crank rotation [rad]"])
-    if scene.timed:
-        return rotation, "crank rotation [deg]"
-    return np.arange(len(rotation), dtype=float), "target point"
-
-
 def _plot_rocker(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the rocker angle over the crank rotation with its target."""
     assert scene.function is not None
@@ -235,8 +222,8 @@ def _is_met(scene: syn.LinkageScene) -> bool:
 
 def _plot_errors(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the errors of position and of angle at the stations."""
-    x, words = _station_axis(scene)
     columns = scene.stations
+    x = np.degrees(columns["crank rotation [rad]"]) if scene.timed else np.arange(len(columns["crank rotation [rad]"]))
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
     if "error [m]" in columns:
         error = MM_PER_METRE * columns["error [m]"]
@@ -246,17 +233,16 @@ def _plot_errors(axis: Axes, scene: syn.LinkageScene) -> None:
         most = 1.05 * float(error[np.isfinite(error)].max(initial=0.0))
         axis.set_ylim(0.0, max(axis.get_ylim()[1], most, 10.0 * ROUNDING))
     if "error of angle [rad]" in columns:
-        beside = axis.twinx() if "error [m]" in columns else axis
-        turned = np.degrees(columns["error of angle [rad]"])
-        turned = np.where(np.abs(turned) > ROUNDING, turned, 0.0)
-        colour = style.COLOURS[2] if beside is not axis else style.COLOURS[0]
-        beside.axhline(0.0, color="0.6", linewidth=style.HAIR)
-        beside.plot(x, turned, color=colour, linestyle="-" if beside is axis else "--", **few)
-        beside.set_ylabel("error of angle [deg]", color=colour if beside is not axis else "black")
-        if beside is not axis:
+        beside, colour, of_label, line = axis, style.COLOURS[0], "black", "-"
+        if "error [m]" in columns:
+            beside, colour, of_label, line = axis.twinx(), style.COLOURS[2], style.COLOURS[2], "--"
             beside.spines["right"].set_visible(True)
             beside.grid(False)
-    axis.set_xlabel(words)
+        turned = np.degrees(columns["error of angle [rad]"])
+        beside.axhline(0.0, color="0.6", linewidth=style.HAIR)
+        beside.plot(x, np.where(np.abs(turned) > ROUNDING, turned, 0.0), color=colour, linestyle=line, **few)
+        beside.set_ylabel("error of angle [deg]", color=of_label)
+    axis.set_xlabel("crank rotation [deg]" if scene.timed else "target point")
     if not scene.timed:
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -280,14 +266,11 @@ def _plot_pivot_motion(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the motion of a movable rocker pivot, on a slider or a second crank, over a crank turn."""
     assert scene.motion is not None
     name, values = scene.motion
-    if name.endswith("[m]"):
-        name, values = name.replace("[m]", "[mm]"), MM_PER_METRE * values
-    else:
-        name, values = name.replace("[rad]", "[deg]"), np.degrees(values)
+    unit, factor = display_scale("m" if name.endswith("[m]") else "rad")
     turns = np.degrees(scene.transmission[0])
-    axis.plot(turns, values, color=style.SLIDER)
+    axis.plot(turns, factor * values, color=style.SLIDER)
     _tick_quarter_turns(axis, turns)
-    axis.set_ylabel(name.replace(" ", "\n", 1))
+    axis.set_ylabel(f"{name.partition('[')[0]}[{unit}]".replace(" ", "\n", 1))
 
 
 def _tick_quarter_turns(axis: Axes, turns: FloatArray) -> None:
@@ -299,7 +282,7 @@ def _draw_panel(axis: Axes, scene: syn.LinkageScene, *, size: float, letters: bo
     """Draw the linkage at the start of its motion with its curve and the target."""
     _, pins = _start_position(scene)
     frame = _Frame(scene, _framed_rotations(scene))
-    frame.prepare(axis)
+    _set_one_scale(axis, frame.low, frame.high)
     _draw_target(axis, scene, size=size)
     _draw_curves(axis, scene)
     _draw_linkage(axis, scene, frame, pins, letters=letters)
@@ -314,6 +297,7 @@ def _plot_task(axis: Axes, scene: syn.LinkageScene) -> None:
 
 
 @plot.register
+@style.figure_style()
 def plot_solution(solution: syn.Solution, *, title: str = "") -> Figure:
     """Plot a linkage to scale, its target and result with magnified errors, the errors, and the transmission angle.
 
@@ -323,28 +307,24 @@ def plot_solution(solution: syn.Solution, *, title: str = "") -> Figure:
         If the links cannot be joined anywhere.
     """
     scene = syn.LinkageScene(solution, title)
-    with style.figure_style():
-        met = _is_met(scene)
-        right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
-        figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
-        panels = figure.subplot_mosaic(
-            [["linkage", name] for name in right],
-            width_ratios=(1.25, 1.0),
-            height_ratios=(2.1, *(1.0 for _ in right[1:])),
-        )
-        _draw_panel(panels["linkage"], scene, size=2.5)
-        _plot_task(panels["task"], scene)
-        if not met:
-            _plot_errors(panels["errors"], scene)
-        _plot_transmission(panels["transmission"], scene)
-        if scene.motion is not None:
-            _plot_pivot_motion(panels["motion"], scene)
-        style.write_title(figure, scene.title)
-        style.write_notes(figure, ["Every target is met: errors are rounding alone."] if met else [])
-        figure.align_ylabels([panels[name] for name in right])
-        return style.finish(figure)
+    met = _is_met(scene)
+    right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
+    figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
+    panels = figure.subplot_mosaic(
+        [["linkage", name] for name in right], width_ratios=(1.25, 1.0), height_ratios=(2.1, *(1.0 for _ in right[1:]))
+    )
+    _draw_panel(panels["linkage"], scene, size=2.5)
+    _plot_task(panels["task"], scene)
+    if not met:
+        _plot_errors(panels["errors"], scene)
+    _plot_transmission(panels["transmission"], scene)
+    if scene.motion is not None:
+        _plot_pivot_motion(panels["motion"], scene)
+    figure.align_ylabels([panels[name] for name in right])
+    return style.finish(figure, scene.title, ["Every target is met: errors are rounding alone."] if met else [])
 
 
+@style.figure_style()
 def plot_sheet(
     solution: syn.Solution | syn.Assessment, forces: syn.PinForces | None = None, *, title: str = "", made: str = ""
 ) -> Figure:
@@ -368,30 +348,25 @@ def plot_sheet(
     assessment = solution if isinstance(solution, syn.Assessment) else syn.assess(solution)
     solution = assessment.solution
     scene = syn.LinkageScene(solution, title)
-    with style.figure_style():
-        figure = Figure(figsize=A4)
-        right = ["task", "transmission", *(["forces"] if forces is not None else [])]
-        rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
-        panels = figure.subplot_mosaic(
-            rows, width_ratios=(1.2, 1.0), height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5)
-        )
-        _draw_panel(panels["linkage"], scene, size=2.0)
-        _plot_task(panels["task"], scene)
-        _plot_transmission(panels["transmission"], scene)
-        if forces is not None:
-            _plot_forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, syn.SliderCrank) else "D")
-        head, *dimensions = assessment.dimensions
-        panels["table"].axis("off")
-        grid = panels["table"].table(
-            dimensions, colLabels=head, cellLoc="right", loc="upper center", edges="horizontal"
-        )
-        grid.auto_set_font_size(False)
-        grid.set_fontsize(style.TINY)
-        grid.auto_set_column_width(range(len(head)))
-        style.write_title(figure, scene.title)
-        verdict = f"{solution.verdicts.grashof}; " + syn.headline(solution).replace("\n", "; ")
-        style.write_notes(figure, [line for line in (verdict, assessment.rounding, made) if line])
-        return style.finish(figure)
+    figure = Figure(figsize=A4)
+    right = ["task", "transmission", *(["forces"] if forces is not None else [])]
+    rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
+    panels = figure.subplot_mosaic(
+        rows, width_ratios=(1.2, 1.0), height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5)
+    )
+    _draw_panel(panels["linkage"], scene, size=2.0)
+    _plot_task(panels["task"], scene)
+    _plot_transmission(panels["transmission"], scene)
+    if forces is not None:
+        _plot_forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, syn.SliderCrank) else "D")
+    head, *dimensions = assessment.dimensions
+    panels["table"].axis("off")
+    grid = panels["table"].table(dimensions, colLabels=head, cellLoc="right", loc="upper center", edges="horizontal")
+    grid.auto_set_font_size(False)
+    grid.set_fontsize(style.TINY)
+    grid.auto_set_column_width(range(len(head)))
+    verdict = f"{solution.verdicts.grashof}; " + syn.headline(solution).replace("\n", "; ")
+    return style.finish(figure, scene.title, [line for line in (verdict, assessment.rounding, made) if line])
 
 
 def _plot_forces(axis: Axes, forces: syn.PinForces, last: str) -> None:
@@ -404,6 +379,7 @@ def _plot_forces(axis: Axes, forces: syn.PinForces, last: str) -> None:
 
 
 @plot.register
+@style.figure_style()
 def plot_alternatives(synthesis: syn.Synthesis, *, title: str = "") -> Figure:
     """Plot the ranked linkages beside one another, each to its own scale, with curve, target and error.
 
@@ -417,32 +393,25 @@ def plot_alternatives(synthesis: syn.Synthesis, *, title: str = "") -> Figure:
         raise InputError("there are no linkages to draw")
     columns = min(3, len(scenes))
     rows = ceil(len(scenes) / columns)
-    with style.figure_style():
-        figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axis, scene in zip(axes, scenes):
-            _draw_panel(axis, scene, size=1.8, letters=False)
-            axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=style.SMALL)
-        names = [
-            ("crank", style.CRANK),
-            ("coupler", style.COUPLER),
-            ("rocker", style.ROCKER),
-            ("target", style.TARGET),
-            ("path", style.TRACE),
-        ]
-        if all(isinstance(scene.linkage, syn.SliderCrank) for scene in scenes):
-            del names[2]
-        if scenes[0].target is None:
-            names = names[:-2]
-        handles = [Line2D([], [], color=colour, linewidth=2.4, label=name) for name, colour in names]
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 3 * columns))
-        for axis in axes[len(scenes) :]:
-            axis.set_visible(False)
-        style.write_title(figure, title)
-        return style.finish(figure)
+    figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axis, scene in zip(axes, scenes):
+        _draw_panel(axis, scene, size=1.8, letters=False)
+        axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=style.SMALL)
+    colours = {"crank": style.CRANK, "coupler": style.COUPLER}
+    if not all(isinstance(scene.linkage, syn.SliderCrank) for scene in scenes):
+        colours["rocker"] = style.ROCKER
+    if scenes[0].target is not None:
+        colours |= {"target": style.TARGET, "path": style.TRACE}
+    handles = [Line2D([], [], color=colour, linewidth=2.4, label=name) for name, colour in colours.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 3 * columns))
+    for axis in axes[len(scenes) :]:
+        axis.set_visible(False)
+    return style.finish(figure, title)
 
 
 @plot.register
+@style.figure_style()
 def plot_trade_off(traded: syn.TradeOff, *, title: str = "") -> Figure:
     """Plot quality function and worst error over the limit that was varied; limits at which no linkage was found are marked.
 
@@ -464,29 +433,28 @@ def plot_trade_off(traded: syn.TradeOff, *, title: str = "") -> Figure:
     label = f"limit of the {over.name}" if over.small else f"{over.name} asked for"
     limit, limit_label = over.factor * traded.limit, f"{label} [{over.shown}]"
     order = np.argsort(limit)
-    with style.figure_style():
-        figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
-        axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
-        for axis, (label, values) in zip(axes, errors.items()):
-            there = np.isfinite(values)
-            known = values[there]
-            if len(known) and known.min() > 0.0 and known.max() > 20.0 * known.min():
-                axis.set_yscale("log")
-            axis.plot(limit[order], values[order], "-o", color=style.COLOURS[0], markersize=4.0)
-            if not there.all():
-                # at the foot of the panel, whatever its scale
-                foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "zorder": 5}
-                none = limit[~there]
-                axis.plot(none, np.full(len(none), 0.04), "x", color=style.COLOURS[1], label="no linkage", **foot)
-                axis.legend()
-            axis.set_ylabel(label)
-        axes[-1].set_xlabel(limit_label)
-        style.write_title(figure, title)
-        figure.align_ylabels()
-        return style.finish(figure)
+    figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
+    axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
+    for axis, (label, values) in zip(axes, errors.items()):
+        there = np.isfinite(values)
+        known = values[there]
+        if len(known) and known.min() > 0.0 and known.max() > 20.0 * known.min():
+            axis.set_yscale("log")
+        axis.plot(limit[order], values[order], "-o", color=style.COLOURS[0], markersize=4.0)
+        if not there.all():
+            # at the foot of the panel, whatever its scale
+            foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "zorder": 5}
+            none = limit[~there]
+            axis.plot(none, np.full(len(none), 0.04), "x", color=style.COLOURS[1], label="no linkage", **foot)
+            axis.legend()
+        axis.set_ylabel(label)
+    axes[-1].set_xlabel(limit_label)
+    figure.align_ylabels()
+    return style.finish(figure, title)
 
 
 @animate.register
+@style.figure_style()
 def animate_solution(
     solution: syn.Solution, path: str | Path, *, title: str = "", frames: int = 48, frames_per_second: int = 20
 ) -> Path:
@@ -508,36 +476,35 @@ def animate_solution(
     frame = _Frame(scene, _framed_rotations(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
-    with style.figure_style():
-        figure = Figure(figsize=(5.4, tall + 2.1))
-        above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
-        style.write_title(figure, scene.title)
-        if scene.function is not None:
-            _plot_rocker(below, scene)
-        else:
-            _plot_transmission(below, scene)
-        x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
-        (now,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=6)
-        trace: list[FloatArray] = []
-        frame.prepare(above)
-        _draw_target(above, scene, size=2.0)
-        _draw_curves(above, scene, traced=False)
-        fixed = set(above.get_children())
-        with gif(figure, path, frames_per_second) as (file, add_frame):
-            for phi in turn:
-                pins = scene.pins(float(phi))
-                if pins is None:
-                    # the trace has a gap there
-                    trace.append(np.full(2, np.nan))
-                    continue
-                for artist in above.get_children():
-                    if artist not in fixed:
-                        artist.remove()
-                if "P" in pins:
-                    trace.append(MM_PER_METRE * np.array(pins["P"]))
-                    draw_line(above, trace, color=style.TRACE, linewidth=style.BOLD, zorder=4)
-                _draw_linkage(above, scene, frame, pins, letters=False)
-                at = x[0] + (np.degrees(phi) - x[0]) % 360.0
-                now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])
-                add_frame()
+    figure = Figure(figsize=(5.4, tall + 2.1))
+    above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
+    style.write_title(figure, scene.title)
+    drawn, plot_below = (
+        (scene.transmission, _plot_transmission) if scene.function is None else (scene.function, _plot_rocker)
+    )
+    plot_below(below, scene)
+    x, y = np.degrees(drawn)
+    (now,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=6)
+    trace: list[FloatArray] = []
+    _set_one_scale(above, frame.low, frame.high)
+    _draw_target(above, scene, size=2.0)
+    _draw_curves(above, scene, traced=False)
+    fixed = set(above.get_children())
+    with gif(figure, path, frames_per_second) as (file, add_frame):
+        for phi in turn:
+            pins = scene.pins(float(phi))
+            if pins is None:
+                # the trace has a gap there
+                trace.append(np.full(2, np.nan))
+                continue
+            for artist in above.get_children():
+                if artist not in fixed:
+                    artist.remove()
+            if "P" in pins:
+                trace.append(MM_PER_METRE * np.array(pins["P"]))
+                draw_line(above, trace, color=style.TRACE, linewidth=style.BOLD, zorder=4)
+            _draw_linkage(above, scene, frame, pins, letters=False)
+            at = x[0] + (np.degrees(phi) - x[0]) % 360.0
+            now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])
+            add_frame()
     return file

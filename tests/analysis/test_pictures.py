@@ -266,7 +266,7 @@ def test_sides_of_a_value_and_what_is_missing_are_in_the_legend() -> None:
     values = [[0.5, 1.5, np.nan], [0.9, 1.1, 1.0]]
     words = np.array([["stable", "unstable", "not found"], ["stable", "unstable", "marginal"]])
     chart = map_of(values, sides=("stable", "unstable"), missing="not found", hover={"motion": words})
-    (axis,) = figures.plot_charts([chart], title="").axes
+    (axis,) = figures.plot_curves([chart], title="").axes
     entries = dict(zip((t.get_text() for t in axis.get_legend().get_texts()), axis.get_legend().get_patches()))
     assert list(entries) == ["stable", "unstable", "not found"]
     assert [bool(patch.get_hatch()) for patch in entries.values()] == [False, True, False]
@@ -285,7 +285,7 @@ def test_classes_have_colours_and_hatches_of_their_own() -> None:
     chart = map_of(
         [[0.0, 1.0, 1.0], [2.0, 2.0, np.nan]], classes={"a": "#ff0000", "b": "#00ff00", "c": "#0000ff"}, middle=None
     )
-    (axis,) = figures.plot_charts([chart], title="").axes
+    (axis,) = figures.plot_curves([chart], title="").axes
     mesh = axis.collections[0]
     assert [mesh.to_rgba(n)[:3] for n in range(3)] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
     assert [t.get_text() for t in axis.get_legend().get_texts()] == ["a", "b", "c", "no value"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 
-from analysis.figures import Curve, HeatMap, Panel, plot_charts
+from analysis.figures import Curve, HeatMap, Panel, plot_curves
 from analysis.files import WritingError
 from analysis.numerics.boundaries import Box, Reason, chart, find_minimum, scan, trace
 from analysis.periodic import (
@@ -545,20 +545,20 @@ def test_chart_in_colours() -> None:
     panel = Panel(x_label="x", y_label="y", curves=[Curve(x=[0.0, 1.0], y=[0.0, 2.0], label="boundary")])
     values[0, 0] = np.ma.masked
     chart_ = HeatMap(panel=panel, x=x, y=y, values=values, label="largest multiplier", missing="no orbit")
-    figure = plot_charts([chart_, panel], title="A chart", columns=2)
+    figure = plot_curves([chart_, panel], title="A chart", columns=2)
     assert figure.axes[0].collections[0].get_array().mask.sum() == 1
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["boundary", "no orbit"]
     assert figure.axes[0].child_axes[0].get_ylabel() == "largest multiplier"
     assert len(figure.axes) == 2
     # white is 1 and blue below it, red above, on however many sides there are values
     for shift in (0.0, 0.2, -0.4):
-        mesh = plot_charts([replace(chart_, values=values + shift)], title="").axes[0].collections[0]
+        mesh = plot_curves([replace(chart_, values=values + shift)], title="").axes[0].collections[0]
         below, middle, above = (mesh.to_rgba(value)[:3] for value in (0.9999, 1.0, 1.0001))
         assert middle == pytest.approx((1.0, 1.0, 1.0), abs=0.05)
         assert below[2] > below[0]
         assert above[0] > above[2]
     # another value where that is what parts them
-    mesh = plot_charts([replace(chart_, middle=1.1)], title="").axes[0].collections[0]
+    mesh = plot_curves([replace(chart_, middle=1.1)], title="").axes[0].collections[0]
     assert mesh.to_rgba(1.1)[:3] == pytest.approx((1.0, 1.0, 1.0), abs=0.05)
     nothing = replace(chart_, values=np.ma.masked_all((3, 4)))
-    assert plot_charts([nothing], title="Nothing").axes
+    assert plot_curves([nothing], title="Nothing").axes
