@@ -17,6 +17,7 @@ from analysis.figures.curves import Arrow, Label, Shade
 from analysis.periodic import Basins, Crossing, Response, Risk
 
 from .periodic_branches import branch, hysteresis, response
+from .test_figures import stand_clear
 
 
 @pytest.fixture(scope="module")
@@ -152,10 +153,7 @@ def test_letters_of_points_cover_neither_each_other_nor_their_curve(count: int) 
     )
     (axis,) = figure.axes
     boxes = [super(Annotation, text).get_window_extent() for text in annotations(axis)]
-    assert not any(a.overlaps(b) for n, a in enumerate(boxes) for b in boxes[:n])
-    (line,) = axis.lines
-    path = line.get_transform().transform_path(line.get_path())
-    assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
+    stand_clear(axis, boxes)
     inside = axis.get_window_extent()
     assert all(inside.x0 <= box.x0 and box.x1 <= inside.x1 for box in boxes)
 

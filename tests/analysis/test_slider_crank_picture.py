@@ -52,12 +52,9 @@ class TestProjection:
         assert scene.guide_point(pose.slide) == pytest.approx(pose.slider_pin, abs=1e-6)
 
     def test_azimuth_turns_from_j_to_k(self) -> None:
-        scene, _ = scene_of(OFFSET, 0.5, 0.0, (0.0, 0.0))
-        assert scene.view[2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
-        scene, _ = scene_of(OFFSET, 0.5, 0.0, (0.0, 90.0))
-        assert scene.view[2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
-        scene, _ = scene_of(OFFSET, 0.5, 0.0, (90.0, 30.0))
-        assert scene.view[2] == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+        for view, towards in (((0.0, 0.0), (0, 1, 0)), ((0.0, 90.0), (0, 0, 1)), ((90.0, 30.0), (1, 0, 0))):
+            scene, _ = scene_of(OFFSET, 0.5, 0.0, view)
+            assert scene.view[2] == pytest.approx(towards, abs=1e-12)
 
 
 class TestSolids:
@@ -101,9 +98,9 @@ class TestMechanism:
 
     def test_the_unit_is_that_of_all_lengths(self) -> None:
         said = texts_of(plot_mechanism(OFFSET, 0.5, 0.1, unit="mm"))
-        assert "$a_4$ = 254 mm" in said
-        assert "$S_1$ = 100 mm" in said
-        assert "crank $a_1$ = 304.8 mm" in said
+        assert {"$a_4$ = 254 mm", "$S_1$ = 100 mm", "crank $a_1$ = 304.8 mm"} <= set(said)
+        with pytest.raises(InputError, match=r"'ft'.* mm, cm, m, in"):
+            plot_mechanism(OFFSET, 0.0, unit="ft")
 
     def test_one_scale_on_both_axes_and_everything_on_the_sheet(self) -> None:
         for p, shift in ((OFFSET, 0.0889), (TWISTED, 0.0), (parameters(-30.0), -0.2), (parameters(0.0), 0.0)):
@@ -163,10 +160,6 @@ class TestMechanism:
     def test_what_cannot_be_drawn(self, arguments, error, words) -> None:
         with pytest.raises(error, match=words):
             plot_mechanism(*arguments)
-
-    def test_units_there_are(self) -> None:
-        with pytest.raises(InputError, match=r"'ft'.* mm, cm, m, in"):
-            plot_mechanism(OFFSET, 0.0, unit="ft")
 
 
 class TestRange:

@@ -120,15 +120,10 @@ def test_a_case_is_a_state_of_the_page(linkwork: Callable[..., Result], tmp_path
     speeds = [state["values"][name] for name in ("drive.speed", "initial.crank_speed")]
     assert speeds == 2 * [PUBLISHED["table-3.1"].crank_speed]
     assert state["values"]["drive.mode"] == 1.0
-
-
-def test_a_published_set_opens_as_in_the_list_of_the_page(linkwork: Callable[..., Result], tmp_path: Path) -> None:
-    assert linkwork("studio", "table-3.1", "--out", "page.html").exit_code == 0
-    text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    state = json.loads(text.split('id="state">')[1].split("</script>")[0])
+    # all else as in the list of the page
     known = PUBLISHED["table-3.1"]
-    assert state["title"] == known.source
-    assert published_values(find_mechanism(known.parameters), known).items() <= state["values"].items()
+    listed = published_values(find_mechanism(known.parameters), known)
+    assert {name for name, value in listed.items() if state["values"][name] != value} == {"slider.stiffness"}
 
 
 @pytest.mark.parametrize(
@@ -396,19 +391,6 @@ def test_motion_drawing_and_lines_are_saved(page: Page, tmp_path: Path) -> None:
         printed = called(sys.executable, _saved(page, "python"), cwd=tmp_path)
         assert found["answer"]["orbit"]["found"], found["answer"]["orbit"]
         assert f"{2.0 * np.pi / found['answer']['orbit']['period']:.4g} rad/s" in printed
-
-
-@in_browser
-def test_a_link_holds_the_state(page: Page, browser: Browser) -> None:
-    state = opening_state()
-    state["values"] |= {"crank.length": 0.0421}
-    _load(page, state)
-    page.select_option("#save", "link")
-    other = browser.new_page()
-    other.goto(page.url)
-    other.wait_for_function("document.documentElement.dataset.ready")
-    assert other.evaluate("window.studio.state.values") == state["values"]
-    other.close()
 
 
 @in_browser

@@ -247,7 +247,8 @@ def test_a_phone_scrolls_over_the_picture_and_its_controls_can_be_hit(phone: Any
     x, y = _pin(page, "P")
     touch("Start", (x, y))
     for n in range(1, 6):
-        touch("Move", (x, y - 4 * n))
+        touch("Move", (x + 2 * n, y - 4 * n))
+    np.testing.assert_allclose(_pin(page, "P"), (x + 10, y - 20), atol=0.5)
     touch("End")
     assert page.evaluate("scrollY") == scrolled
     assert _given(page, "coupler.point_distance") != before
