@@ -74,18 +74,6 @@ def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor:
     )
 
 
-def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
-    """Return the pose at a crank angle (rad) and a shift (m), with lengths multiplied by ``factor``.
-
-    Raises AssemblyError if the rod does not reach the guide there; InputError if angle or shift are not finite.
-    """
-    for name, value in (("crank angle", angle), ("shift", shift)):
-        if not isfinite(value):
-            raise InputError(f"the {name} is {value!r}: it must be a finite number")
-    check_assembly(angle, shift, parameters.constants())
-    return _pose(parameters, angle, shift, factor)
-
-
 def _angles(part: Range, law: PeriodicShift) -> FloatArray:
     """Return crank angles (rad) over a range of assembly, slightly inside its ends unless it is a full turn."""
     inset = min(_INSET, 0.25 * (part.high - part.low)) if not part.full(law.span) else 0.0
@@ -99,16 +87,19 @@ def _factor(unit: str) -> float:
     return UNITS[unit]
 
 
+@dataclass(frozen=True, slots=True)
 class _Part:
-    """A range of assembly: poses along it, at its dead centres, and at its limits if the crank cannot turn fully."""
+    """Poses and paths of the pins over a run or a range of assembly, with dead centres and with limits, if there are any."""
 
-    def __init__(self, parameters: SliderCrankParameters, part: Range, law: PeriodicShift, factor: float) -> None:
-        self.angles = _angles(part, law)
-        self.poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in self.angles]
-        self.crank_pins = np.array([pose.crank_pin for pose in self.poses])
-        self.slider_pins = np.array([pose.slider_pin for pose in self.poses])
-        self.dead = [_pose(parameters, d.crank_angle, d.shift, factor) for d in part.dead_centres]
-        self.limits = [self.poses[0], self.poses[-1]] if not part.full(law.span) else []
+    poses: Sequence[_Pose]
+    crank_pins: FloatArray
+    slider_pins: FloatArray
+    dead: Sequence[_Pose] = ()
+    limits: Sequence[_Pose] = ()
+
+    @property
+    def angles(self) -> FloatArray:
+        return np.array([pose.angle for pose in self.poses])
 
     @property
     def marks(self) -> tuple[tuple[Sequence[_Pose], str, str, str], ...]:
@@ -116,17 +107,15 @@ class _Part:
         return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
 
 
-class _Track(NamedTuple):
-    """Poses of a run and the paths of its pins, drawn like a `_Part`."""
-
-    poses: Sequence[_Pose]
-    crank_pins: FloatArray
-    slider_pins: FloatArray
-    marks: tuple[tuple[Sequence[_Pose], str, str, str], ...] = ()
-
-
 def _parts(parameters: SliderCrankParameters, law: PeriodicShift, factor: float) -> list[_Part]:
-    return [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+    """Return the ranges of assembly, with lengths multiplied by ``factor``."""
+    found = []
+    for part in ranges(parameters, law):
+        poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in _angles(part, law)]
+        crank, slider = (np.array(pins) for pins in zip(*((pose.crank_pin, pose.slider_pin) for pose in poses)))
+        dead = [_pose(parameters, d.crank_angle, d.shift, factor) for d in part.dead_centres]
+        found.append(_Part(poses, crank, slider, dead, [] if part.full(law.span) else [poses[0], poses[-1]]))
+    return found
 
 
 class _Label(NamedTuple):
@@ -144,7 +133,7 @@ class _Scene:
     def __init__(
         self,
         parameters: SliderCrankParameters,
-        parts: Sequence[_Part | _Track],
+        parts: Sequence[_Part],
         poses: Sequence[_Pose],
         unit: str,
         view: tuple[float, float],
@@ -211,14 +200,9 @@ class _Scene:
             self._letters(axis, pose)
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
-        default: dict[str, Any] = {
-            "color": style.GROUND,
-            "linewidth": style.THIN,
-            "zorder": 4,
-            "solid_capstyle": "round",
-        }
+        usual: dict[str, Any] = {"color": style.GROUND, "linewidth": style.THIN, "zorder": 4, "solid_capstyle": "round"}
         shown = self.page(points).T
-        axis.plot(*shown, **default | look)
+        axis.plot(*shown, **usual | look)
         # about thirty points of a curve are enough to keep texts away
         self.lines.append(shown[:, :: max(1, shown.shape[1] // 30)])
 
@@ -287,18 +271,13 @@ class _Scene:
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
         twist = self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)])
         self._line(axis, twist, color=_TWIST, linewidth=style.LINE)
-        look = {
-            "arrowstyle": "-|>",
-            "color": "black",
-            "linewidth": style.THIN,
-            "mutation_scale": 8,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        }
+        look = {"arrowstyle": "-|>", "color": "black", "linewidth": style.THIN, "mutation_scale": 8}
         for origin, rows in ((np.zeros(3), np.eye(3)), (self.foot, self.frame4)):
             for way in rows:
                 start, end = self.page([origin, origin + 2.4 * u * way])
-                axis.annotate("", end.tolist(), start.tolist(), arrowprops=look, zorder=7)
+                axis.annotate(
+                    "", end.tolist(), start.tolist(), arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=7
+                )
                 self.lines.append(np.array([start, end]).T)
 
     def _letters(self, axis: Axes, pose: _Pose) -> None:
@@ -382,7 +361,11 @@ def plot_mechanism(
     InputError
         If angle or shift are not finite, or the unit is unknown.
     """
-    pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
+    for name, value in (("crank angle", crank_angle), ("shift", shift)):
+        if not isfinite(value):
+            raise InputError(f"the {name} is {value!r}: it must be a finite number")
+    check_assembly(crank_angle, shift, parameters.constants())
+    pose = _pose(parameters, crank_angle, shift, _factor(unit))
     parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
     scene = _Scene(parameters, parts, [pose], unit, view)
     figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
@@ -399,7 +382,7 @@ def draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory
         factor * np.column_stack([run[f"{pin}.{x}"] for x in "xyz"]) for pin in ("crank_pin", "slider_pin")
     )
     samples, when = last_samples(run)
-    scene = _Scene(parameters, [_Track(poses, crank[samples], slider[samples])], poses, "mm", VIEW)
+    scene = _Scene(parameters, [_Part(poses, crank[samples], slider[samples])], poses, "mm", VIEW)
     style.frame_drawing(axis, scene.low, scene.high)
     scene.draw(axis, poses[0], letters=False)
     return f"at {run.time[0]:.4g} s, with the paths of the pins {when}"

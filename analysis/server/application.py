@@ -97,8 +97,12 @@ class Application:
         self._lost = _LOST_PAGE.encode()
         self._policy = _POLICY.format(_hashes(page + _LOST_PAGE))
         self._places: dict[str, dict[str, Callable[[Mapping[str, Any]], tuple[HTTPStatus, bytes]]]] = {
-            "/": {"GET": self._get_page},
-            "/job": {"GET": self._get_job, "POST": self._post_job, "DELETE": self._delete_job},
+            "/": {"GET": lambda _: (HTTPStatus.OK, self.page)},
+            "/job": {
+                "GET": lambda _: (HTTPStatus.OK, _json(worker.look())),
+                "POST": self._post_job,
+                "DELETE": lambda _: (HTTPStatus.OK, _json(worker.cancel())),
+            },
         }
 
     def __call__(self, environ: Mapping[str, Any], start: _Start) -> Iterable[bytes]:
@@ -143,15 +147,6 @@ class Application:
         if environ["PATH_INFO"] != "/":
             return str(environ.get(f"HTTP_{TOKEN.upper().replace('-', '_')}", ""))
         return str(parse_qs(environ.get("QUERY_STRING", "")).get("token", [""])[0])
-
-    def _get_page(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
-        return HTTPStatus.OK, self.page
-
-    def _get_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
-        return HTTPStatus.OK, _json(self.worker.look())
-
-    def _delete_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
-        return HTTPStatus.OK, _json(self.worker.cancel())
 
     def _post_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         if environ.get("CONTENT_TYPE", "").partition(";")[0].strip() != "application/json":

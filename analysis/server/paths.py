@@ -161,23 +161,18 @@ def _picture(solution: syn.Solution) -> Answer:
         *(["DE"] if scene.second_crank else []),
     ]
     guide = [] if scene.guide is None else [scene.guide.tolist()]
+    # for an open path the rest of the curve, which may be far larger, is left out
+    curves = scene.curves if scene.target_closed else [] if scene.traced_curve is None else [scene.traced_curve]
     return {
         "links": [[pins[name] for name in link] for link in links if pins] + guide,
-        # for an open path the rest of the curve, which may be far larger, is left out
-        "curves": [piece[::_EVERY].tolist() for piece in (scene.curves if scene.target_closed else _joined(scene))],
+        "curves": [piece[np.isfinite(piece).all(axis=1)][::_EVERY].tolist() for piece in curves],
     }
-
-
-def _joined(scene: syn.LinkageScene) -> list[FloatArray]:
-    traced = scene.traced_curve
-    return [] if traced is None else [traced[np.isfinite(traced).all(axis=1)]]
 
 
 def _in_ground_frame(points: FloatArray, linkage: syn.Linkage) -> FloatArray:
     """Return points of the plane in the frame of a linkage's ground link, shape (n, 2)."""
-    z = (points[:, 0] + 1j * points[:, 1] - complex(linkage.pivot_x, linkage.pivot_y)) * np.exp(
-        -1j * linkage.ground_angle
-    )
+    from_pivot = points @ [1.0, 1j] - complex(linkage.pivot_x, linkage.pivot_y)
+    z = from_pivot * np.exp(-1j * linkage.ground_angle)
     return np.column_stack([z.real, z.imag])
 
 

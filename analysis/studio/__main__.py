@@ -1,5 +1,6 @@
 """Build the page with `python -m analysis.studio`, from the template that `npm run build` in `studio/` has written."""
 
-from .page import main
+from ..files import write_text
+from .page import PAGE, build_page
 
-main()
+write_text(PAGE, build_page())

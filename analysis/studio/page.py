@@ -17,7 +17,6 @@ from linkwork import __version__
 from linkwork.errors import InputError
 
 from ..export import SOURCES
-from ..files import write_text
 from ..mechanisms import MECHANISMS
 from ..periodic import TOLERANCE
 from .state import opening_state
@@ -102,11 +101,6 @@ def page_address(state: Mapping[str, Any], page: str) -> str:
     values = {name: value for name, value in state["values"].items() if value != start.get(name)}
     text = json.dumps(dict(state) | {"values": values}, separators=(",", ":"), ensure_ascii=False)
     return f"{page}#state={base64.urlsafe_b64encode(text.encode()).decode().rstrip('=')}"
-
-
-def main() -> None:
-    """Build the page and write it to `PAGE`."""
-    write_text(PAGE, build_page())
 
 
 def _replace_script(page: str, script: str, data: Any) -> str:

@@ -105,20 +105,14 @@ def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
     UnknownNameError, ParameterError, InputError
         If the mechanism has no variable of that name, or a value is not a finite number.
     """
-    known = _start_values(mechanism)
+    known = {entry.variable.name: float(entry.variable.start) for entry in given_entries(mechanism)}
+    known |= {name: NO_MOTOR[field] for name, (field, _) in motor_parameters(mechanism).items()}
     if not isinstance(values, Mapping):
         raise InputError("a state has no values: it must have numbers by the names of the FMU's variables")
     for name in values:
         if name not in known:
             raise unknown_name(str(name), known)
     return {name: _finite_number(values.get(name, start), name) for name, start in known.items()}
-
-
-def _start_values(mechanism: Mechanism) -> dict[str, float]:
-    """Return the start values of all variables that the page can set, a motor's included, by FMI name."""
-    given = (entry.variable for entry in given_entries(mechanism))
-    motor = {name: NO_MOTOR[field] for name, (field, _) in motor_parameters(mechanism).items()}
-    return {v.name: float(v.start) for v in given} | motor
 
 
 def _finite_number(value: Any, name: str) -> float:

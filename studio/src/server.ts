@@ -76,13 +76,8 @@ export class Server {
     return this.ask("POST", JSON.stringify({ kind, state, wanted }));
   }
 
-  async look(): Promise<Job> {
-    return this.ask("GET");
-  }
-
-  async cancel(): Promise<Job> {
-    return this.ask("DELETE");
-  }
+  look = (): Promise<Job> => this.ask("GET");
+  cancel = (): Promise<Job> => this.ask("DELETE");
 
   /** The end of a job that is being done; `told` hears of how it goes on. */
   async follow(begun: Job, told: (job: Job) => void): Promise<Job> {

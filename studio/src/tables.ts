@@ -173,35 +173,31 @@ export function checkState(data: unknown, tables: Tables): State {
   const mechanism = tables.mechanisms.find((m) => m.name === state.mechanism);
   if (!mechanism) throw new Error(`the page has no mechanism ${JSON.stringify(state.mechanism)}`);
   const { title = "", values = {}, source = "steady", duration, locks = [], behind, view } = state;
-  const fail = (name: string, value: unknown): never => {
-    throw new Error(`${name} is ${JSON.stringify(value)} in the state`);
+  const hold = (good: boolean, name: string, value: unknown): void => {
+    if (!good) throw new Error(`${name} is ${JSON.stringify(value)} in the state`);
   };
-  if (typeof title !== "string") fail("the title", title);
-  if (typeof values !== "object" || values === null) fail("values", values);
+  hold(typeof title === "string", "the title", title);
+  hold(typeof values === "object" && values !== null, "values", values);
   const names = new Set(mechanism.given.map((given) => given.name));
   for (const [name, value] of Object.entries(values)) {
     if (!names.has(name)) throw new Error(`${mechanism.name} has no ${JSON.stringify(name)}`);
-    if (!isNumber(value)) fail(name, value);
+    hold(isNumber(value), name, value);
   }
-  if (source !== "steady" && source !== "run") fail("the source", source);
-  if (duration !== undefined && !(isNumber(duration) && duration > 0)) fail("the duration", duration);
-  if (!Array.isArray(locks) || !locks.every((name) => names.has(name))) fail("locks", locks);
+  hold(source === "steady" || source === "run", "the source", source);
+  hold(Array.isArray(locks) && locks.every((name) => names.has(name)), "locks", locks);
   const found: State = { mechanism: mechanism.name, title, values: { ...values }, source, locks };
-  if (duration !== undefined) found.duration = duration;
+  if (duration !== undefined) {
+    hold(isNumber(duration) && duration > 0, "the duration", duration);
+    found.duration = duration;
+  }
   if (behind !== undefined) {
-    if (typeof behind !== "object" || behind === null) fail("what is behind", behind);
-    const { x, y, width, angle, opacity, locked } = behind;
-    if (![x, y, width, angle, opacity].every(isNumber) || !(width > 0)) fail("what is behind", behind);
+    const { x, y, width, angle, opacity, locked } = behind ?? {};
+    hold([x, y, width, angle, opacity].every(isNumber) && width > 0, "what is behind", behind);
     found.behind = { x, y, width, angle, opacity, locked: locked === true };
   }
   if (view !== undefined) {
-    if (
-      !Array.isArray(view) ||
-      view.length !== 5 ||
-      !view.every(isNumber) ||
-      !(view[2] >= 0.02 && view[2] <= 200)
-    )
-      fail("the view", view);
+    const whole = Array.isArray(view) && view.length === 5 && view.every(isNumber);
+    hold(whole && view[2] >= 0.02 && view[2] <= 200, "the view", view);
     found.view = view;
   }
   return found;

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { dxfText, readLines } from "../src/dxf";
+import { points } from "./wheel";
 
 const drawing = (...rows: (string | number)[]): string =>
   ["0", "SECTION", "2", "ENTITIES", ...rows, "0", "ENDSEC", "0", "EOF"].join("\n");
@@ -12,22 +13,8 @@ function near(found: number[][], wanted: number[][]): void {
 
 test("what is written is read again", () => {
   const text = dxfText([
-    {
-      layer: "ground link",
-      points: [
-        [0, 0],
-        [0.1, -0.05],
-      ],
-    },
-    {
-      layer: "päth",
-      points: [
-        [0, 0],
-        [0.1, 0],
-        [0.1, 0.2],
-      ],
-      closed: true,
-    },
+    { layer: "ground link", points: points("0 0, 0.1 -0.05") },
+    { layer: "päth", points: points("0 0, 0.1 0, 0.1 0.2"), closed: true },
     { layer: "joints", points: [[0.3, 0]], radius: 0.01 },
     { layer: "letters", points: [[0.3, 0]], text: "Ä", height: 0.01 },
   ]);
@@ -35,16 +22,8 @@ test("what is written is read again", () => {
   assert.match(text, /\\U\+00C4/);
   assert.ok(/^[ -~\r\n]*$/.test(text));
   const { paths, left } = readLines(text);
-  near(paths[0], [
-    [0, 0],
-    [0.1, -0.05],
-  ]);
-  near(paths[1], [
-    [0, 0],
-    [0.1, 0],
-    [0.1, 0.2],
-    [0, 0],
-  ]);
+  near(paths[0], points("0 0, 0.1 -0.05"));
+  near(paths[1], points("0 0, 0.1 0, 0.1 0.2, 0 0"));
   for (const [x, y] of paths[2]) assert.ok(Math.abs(Math.hypot(x - 0.3, y) - 0.01) < 1e-9);
   assert.deepEqual(left, { TEXT: 1 });
 });
@@ -52,13 +31,7 @@ test("what is written is read again", () => {
 test("an arc goes round against the clock, from its first angle to its second", () => {
   const rows = ["0", "ARC", "10", 1, "20", 2, "40", 5, "50", 270, "51", 0];
   const [path] = readLines(drawing(...rows)).paths;
-  near(
-    [path[0], path.at(-1)!],
-    [
-      [1e-3, -3e-3],
-      [6e-3, 2e-3],
-    ],
-  );
+  near([path[0], path.at(-1)!], points("1e-3 -3e-3, 6e-3 2e-3"));
   assert.ok(path.every(([x, y]) => x > 1e-3 - 1e-12 && y < 2e-3 + 1e-12));
 });
 

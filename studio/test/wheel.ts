@@ -43,6 +43,10 @@ export const WHEEL: Mechanism = {
   sets: [],
 };
 
+/** Points as "x y, x y". */
+export const points = (text: string): [number, number][] =>
+  text.split(", ").map((pair) => pair.split(" ").map(Number) as [number, number]);
+
 export const TABLES: Tables = { version: "0", tolerance: 1e-6, mechanisms: [WHEEL] };
 
 export const STATE: State = {

@@ -27,7 +27,7 @@ SHORT = replace(parameters(30.0), rod_length=0.9)
 
 
 def scene_of(p, angle, shift, view=pictures.VIEW, unit="in"):
-    pose = pictures._checked_pose(p, angle, shift, pictures.UNITS[unit])
+    pose = pictures._pose(p, angle, shift, pictures.UNITS[unit])
     parts = pictures._parts(p, constant_shift(shift), pictures.UNITS[unit])
     return pictures._Scene(p, parts, [pose], unit, view), pose
 
@@ -134,7 +134,7 @@ class TestMechanism:
     def test_a_groove_moves_the_path_of_the_crank_pin(self) -> None:
         p = replace(OFFSET, groove_amplitude=3.0 * INCH, groove_ratio=2.0)
         law = groove_shift(p)
-        pose = pictures._checked_pose(p, 0.4, law.at(0.4)[0], pictures.UNITS["in"])
+        pose = pictures._pose(p, 0.4, law.at(0.4)[0], pictures.UNITS["in"])
         scene = pictures._Scene(p, pictures._parts(p, law, pictures.UNITS["in"]), [pose], "in", pictures.VIEW)
         (part,) = scene.parts
         x, y, z = part.crank_pins.T

@@ -16,18 +16,16 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, find_mechanism, register
+from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, find_mechanism
 from analysis.periodic import Drive, newton_orbit
 from analysis.run import Case, Inputs, read_case, simulate
-from analysis.studio import PAGE, is_current, make_page, opening_state, page_state
+from analysis.studio import PAGE, is_current, opening_state, page_state
 from analysis.studio.tables import published_values
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from tests import slider_cranks, strategies
 from tests.mechanisms import pendulum
 from tests.scripts import called
-
-from .conftest import opened
 
 ROOT = Path(__file__).parents[2]
 #: The mechanisms of the house: other tests describe linkages of their own.
@@ -38,7 +36,7 @@ BYTES, CLOSE = 500_000, 1e-9
 _HELD: Any = {"step": 0.02 / 1440, "hold": 0.02 / 1440, "tolerance": 1e-12}
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 in_browser = pytest.mark.slow
 
@@ -391,22 +389,3 @@ def test_motion_drawing_and_lines_are_saved(page: Page, tmp_path: Path) -> None:
         printed = called(sys.executable, _saved(page, "python"), cwd=tmp_path)
         assert found["answer"]["orbit"]["found"], found["answer"]["orbit"]
         assert f"{2.0 * np.pi / found['answer']['orbit']['period']:.4g} rad/s" in printed
-
-
-@in_browser
-def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: Path) -> None:
-    register(pendulum.MECHANISM)
-    known = PUBLISHED["pendulum-demo"]
-    case = Case(
-        title="own", parameters=known.parameters, initial=known.initial, inputs=Inputs(torque=0.3), stop_time=0.02
-    )
-    path = tmp_path / "own.html"
-    path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
-    page = opened(browser, path)
-    # beside those of the house: a linkage that Python finds for a path is one of them
-    assert set(OWN) < set(page.evaluate("window.studio.tables.mechanisms.map((one) => one.name)"))
-    found = _shown(page)["columns"]
-    wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
-    _near(found["pendulum.angle"], wanted["pendulum.angle"])
-    _near(found["Bx"], np.cos(wanted["pendulum.angle"]))
-    page.close()

@@ -18,7 +18,7 @@ from benchmarks.studio import figures_in_words, measure_page
 from tests.analysis.conftest import opened
 from tests.analysis.test_linkages import coupled
 from tests.analysis.test_several_freedoms import SHAKER
-from tests.analysis.test_studio import _HELD, _load, _near, _saved, _varied, in_browser
+from tests.analysis.test_studio import _HELD, OWN, _load, _near, _saved, _varied, in_browser
 from tests.analysis.test_swinging_links import yoke
 
 RPM = np.pi / 30.0
@@ -95,6 +95,8 @@ def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_p
     case = Case(title="", parameters=parameters, initial=initial, inputs=inputs, stop_time=1.0)
     (tmp_path / "yoke.html").write_text(make_page(page_state(case)), encoding="utf-8")
     page = opened(browser, tmp_path / "yoke.html")
+    # beside those of the house: a linkage that Python finds for a path is one of them
+    assert {*OWN, mechanism.name} == set(page.evaluate("window.studio.tables.mechanisms.map((one) => one.name)"))
     _explored(page, "response", {"What varies": (6.6 / RPM, 7.2 / RPM)})
     swings, hangs = page.evaluate("window.studio.charts.response.branches")
     response = frequency_response(parameters, 6.6, 7.2, doublings=0)
