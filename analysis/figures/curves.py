@@ -224,13 +224,8 @@ def resize(figure: style.Figure, width: float, height: float) -> style.Figure:
 
 @singledispatch
 def draw_part(part: Any, figure: style.Figure, axis: Axes) -> None:
-    """Draw a part of a picture on the given axes; a function is registered for each kind of part."""
-    raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
-
-
-@draw_part.register
-def _(panel: Panel, figure: style.Figure, axis: Axes) -> None:
-    draw_panel(axis, panel)
+    """Draw a part of a picture on the given axes: a panel, or another kind of part for which a function is registered."""
+    draw_panel(axis, part)
 
 
 def _name_few_decades(axis: Axis) -> None:
@@ -257,21 +252,14 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
             look: dict[str, Any] = {"facecolor": (colour, 0.16), "edgecolor": (colour, 0.45), "linewidth": 0.0}
             axis.axvspan(shade.low, shade.high, hatch=hatch, label=name, zorder=0.5, **look)
     for arrow in panel.arrows:
-        look = {
-            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-            "color": style.MARKED,
-            "linewidth": style.LINE,
-            "shrinkB": 0.0,
-        }
+        head = "-|>,head_width=0.25,head_length=0.5"
+        look = {"arrowstyle": head, "color": style.MARKED, "linewidth": style.LINE, "shrinkB": 0.0}
         axis.annotate("", (arrow.x, arrow.end), (arrow.x, arrow.begin), arrowprops=look, zorder=3.5)
     for label in panel.labels:
         label_place(axis, (label.x, label.y), label.text)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
     axis.set_title(panel.title)
-    if "x" in panel.logarithmic:
-        axis.set_xscale("log")
-    if "y" in panel.logarithmic:
-        axis.set_yscale("log")
+    axis.set(**{f"{log}scale": "log" for log in panel.logarithmic})
     if panel.x_ticks is not None:
         axis.set_xticks(panel.x_ticks, [f"{tick:g}" for tick in panel.x_ticks])
         axis.set_xticks([], minor=True)

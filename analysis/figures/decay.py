@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -27,10 +29,11 @@ def plot_decay(
     title : str
     """
     curves = [] if record is None else [Curve(x=record[0], y=record[1], label="record", colour=COLOURS[0])]
-    curves.append(Curve(x=decay.time, y=decay.position, label="turning points", line="", marker="o", colour=COLOURS[1]))
+    points: dict[str, Any] = {"line": "", "marker": "o", "colour": COLOURS[1]}
+    fit: dict[str, Any] = {"line": "--", "colour": "0.35"}
+    curves.append(Curve(x=decay.time, y=decay.position, label="turning points", **points))
     curves += [
-        Curve(x=decay.time[side::2], y=decay.fitted[side::2], label="" if side else "fit", line="--", colour="0.35")
-        for side in (0, 1)
+        Curve(x=decay.time[side::2], y=decay.fitted[side::2], label="" if side else "fit", **fit) for side in (0, 1)
     ]
     cycles = np.arange(1, len(decay.cycle_decrements) + 1)
     panels = [
@@ -40,16 +43,8 @@ def plot_decay(
             x_ticks=cycles.tolist(),
             y_label="logarithmic decrement of a cycle",
             curves=[
-                Curve(
-                    x=cycles, y=decay.cycle_decrements, label="from two swings", line="", marker="o", colour=COLOURS[1]
-                ),
-                Curve(
-                    x=cycles[[0, -1]],
-                    y=[decay.decrement] * 2,
-                    label="of the damper, by the fit",
-                    colour="0.35",
-                    line="--",
-                ),
+                Curve(x=cycles, y=decay.cycle_decrements, label="from two swings", **points),
+                Curve(x=cycles[[0, -1]], y=[decay.decrement] * 2, label="of the damper, by the fit", **fit),
             ],
             y_range=(0.0, 1.3 * max(decay.decrement, float(decay.cycle_decrements.max()))),
         ),

@@ -103,14 +103,8 @@ def picture(result: Any, *details: Any, **options: Any) -> Any:
 
     Parameters
     ----------
-    result : object
-        A response, a branch, a chart, basins.
-    *details, **options
-        As for `plot`.
-
-    Returns
-    -------
-    Picture
+    result, *details, **options
+        As for `plot`: a response, a branch, a chart, basins.
 
     Raises
     ------

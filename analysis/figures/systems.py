@@ -31,17 +31,9 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> style.Figure:
     axes = figure.add_subplot()
     for name, box in placed.items():
         size = (box.right - box.left, box.top - box.bottom)
-        axes.add_patch(
-            FancyBboxPatch(
-                (box.left, box.bottom),
-                *size,
-                boxstyle="round,pad=0,rounding_size=2",
-                fc="0.96",
-                ec="0.3",
-                lw=style.THIN,
-                zorder=3,
-            )
-        )
+        rounded = "round,pad=0,rounding_size=2"
+        look: dict[str, Any] = {"fc": "0.96", "ec": "0.3", "lw": style.THIN, "zorder": 3}
+        axes.add_patch(FancyBboxPatch((box.left, box.bottom), *size, boxstyle=rounded, **look))
         axes.text(box.left + 0.5 * size[0], box.top - 5.5, name, ha="center", va="center", weight="bold", zorder=4)
         for ports, x, align in ((box.inputs, box.left + 2.0, "left"), (box.outputs, box.right - 2.0, "right")):
             for port in ports:
@@ -71,15 +63,8 @@ def _path(
     if end[0] > start[0]:
         x = end[0] - lane
         return [start, (x, start[1]), (x, end[1]), end]
-    below = lowest - _CLEAR - _LANE * number
-    return [
-        start,
-        (start[0] + lane, start[1]),
-        (start[0] + lane, below),
-        (end[0] - lane, below),
-        (end[0] - lane, end[1]),
-        end,
-    ]
+    below, right, left = lowest - _CLEAR - _LANE * number, start[0] + lane, end[0] - lane
+    return [start, (right, start[1]), (right, below), (left, below), (left, end[1]), end]
 
 
 @plot.register

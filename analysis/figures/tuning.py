@@ -33,13 +33,8 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
         unit, factor = display_scale(si)
         label = f"amplitude of {name_in_words(what)} [{unit}]"
         amplitudes.append((label, lambda b, n=n, factor=factor: factor * b.amplitudes[:, n]))
-    rows = (
-        *amplitudes,
-        (
-            "largest Floquet multiplier,\nunstable above 1" + (f" (cut at {_GREATEST:g})" if cut else ""),
-            lambda b: np.minimum(b.largest_multiplier, _GREATEST),
-        ),
-    )
+    label = "largest Floquet multiplier,\nunstable above 1" + (f" (cut at {_GREATEST:g})" if cut else "")
+    rows = (*amplitudes, (label, lambda b: np.minimum(b.largest_multiplier, _GREATEST)))
     panels = []
     for number, (label, value) in enumerate(rows):
         curves: list[Curve] = []
