@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from linkwork import __version__
 from linkwork.errors import InputError
 
 from ..export import SOURCES
@@ -70,7 +69,7 @@ def build_page() -> str:
         raise InputError(f"{TEMPLATE} is not there: npm run build in {TEMPLATE.parents[1]} writes it")
     template = TEMPLATE.read_text(encoding="utf-8").replace("<title>", f"{_HASH.format(hash_of_sources())}\n<title>", 1)
     made = [mechanism_tables(m) for m in MECHANISMS.values()]
-    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": made}
+    tables = {"tolerance": TOLERANCE, "mechanisms": made}
     return _replace_script(_replace_script(template, "tables", tables), "state", opening_state())
 
 

@@ -131,7 +131,6 @@ def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dic
     if mode is not None:
         row["choices"] = {str(value): words for value, words in enumerate(mode.values)}
         row["arguments"] = list(mode.arguments)
-        row["default"] = mode.default
     elif variable.kind == "Integer":
         row["choices"] = {"1": "+1", "-1": "-1"}
     if channel is not None:

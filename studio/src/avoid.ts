@@ -67,7 +67,7 @@ export function splitArcs(branch: Point[], tolerance: number, of = 0): Arc[] {
 }
 
 /** The amplitude of an arc at a value, between its points. */
-export function interpolateAmplitude({ points, of }: Arc, value: number): number {
+function interpolateAmplitude({ points, of }: Arc, value: number): number {
   const i = Math.max(
     1,
     points.findIndex((point) => point.value >= value),

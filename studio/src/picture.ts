@@ -43,6 +43,49 @@ function beside(from: Point, a: Point, b: Point, along: number, left: number): P
   return [from[0] + along * x + left * y, from[1] + along * y - left * x];
 }
 
+/** The lines of a part at the places of its joints (px). */
+function linesOf(kind: Part["kind"], at: Point[]): Point[][] {
+  const [a, b, c] = at;
+  switch (kind) {
+    case "link":
+      return at.length > 2 ? [at, [a, b]] : [[a, b]];
+    case "axis":
+      return [[a, b]];
+    case "gear": {
+      const [x, y] = [b[0] - a[0], b[1] - a[1]];
+      const rim = Array.from({ length: 73 }, (_, i): Point => {
+        const [c, s] = [Math.cos((i * Math.PI) / 36), Math.sin((i * Math.PI) / 36)];
+        return [a[0] + c * x - s * y, a[1] + s * x + c * y];
+      });
+      return [[a, ...rim]];
+    }
+    case "pivot": {
+      const on = (right: number, down: number): Point => [a[0] + right, a[1] + down];
+      return [[a, on(-11, 18), on(-17, 18), on(17, 18), on(11, 18), a]];
+    }
+    case "guide": {
+      const size = Math.hypot(b[0] - a[0], b[1] - a[1]);
+      return [[-1.4, 1.4].map((share) => beside(a, a, b, share * size, -13))];
+    }
+    case "slider":
+      return [[-19, 19, 19, -19].map((along, n) => beside(a, b, c, along, n < 2 ? -12 : 12))];
+    default: {
+      // from the block to a wall beyond the end of the guide
+      const start = beside(a, b, c, 19, kind === "spring" ? 6 : -6);
+      const size = Math.hypot(c[0] - start[0], c[1] - start[1]);
+      const on = (along: number, left: number): Point => beside(start, b, c, along * size, left);
+      if (kind === "spring") {
+        const turns = Array.from({ length: 13 }, (_, i) => on(0.1 + (0.8 * i) / 12, i % 2 ? 5 : -5));
+        return [[on(0, 0), on(0.1, 0), ...turns, on(0.9, 0), on(1, 0)]];
+      }
+      return [
+        [on(0, 0), on(0.5, 0), on(0.5, 5), on(0.5, -5)],
+        [on(0.4, 6), on(0.7, 6), on(0.7, 0), on(1, 0), on(0.7, 0), on(0.7, -6), on(0.4, -6)],
+      ];
+    }
+  }
+}
+
 interface Shape {
   part: Part;
   group: SVGGElement;
@@ -147,7 +190,7 @@ export class Picture {
       const visible = part.where < 0 || has(part.where);
       for (const one of drawn) one.style.display = visible ? "" : "none";
       const at = part.joints.map((joint) => places[joint]);
-      if (visible) this.shape(part, drawn, at);
+      if (visible) linesOf(part.kind, at).forEach((line, n) => put(drawn[n], { points: written(line) }));
     }
     this.handles.forEach((handle, joint) => {
       const [x, y] = places[joint];
@@ -208,51 +251,6 @@ export class Picture {
       if (style.display === "none" || one.classList.contains("reach")) one.remove();
     });
     return new XMLSerializer().serializeToString(copy);
-  }
-
-  private shape(part: Part, drawn: SVGElement[], at: Point[]): void {
-    const set = (n: number, points: Point[]): void => drawn[n].setAttribute("points", written(points));
-    const [a, b, c] = at;
-    if (part.kind === "link")
-      for (let n = 0; n < drawn.length; n++) set(n, n < drawn.length - 1 ? at : [a, b]);
-    else if (part.kind === "axis") set(0, [a, b]);
-    else if (part.kind === "gear") {
-      const rim = Array.from({ length: 73 }, (_, i): Point => {
-        const [c, s] = [Math.cos((i * Math.PI) / 36), Math.sin((i * Math.PI) / 36)];
-        const [x, y] = [b[0] - a[0], b[1] - a[1]];
-        return [a[0] + c * x - s * y, a[1] + s * x + c * y];
-      });
-      set(0, [a, ...rim]);
-    } else if (part.kind === "pivot") {
-      const [x, y] = a;
-      set(0, [a, [x - 11, y + 18], [x - 17, y + 18], [x + 17, y + 18], [x + 11, y + 18], a]);
-    } else if (part.kind === "guide") {
-      const size = Math.hypot(b[0] - a[0], b[1] - a[1]);
-      set(0, [beside(a, a, b, -1.4 * size, -13), beside(a, a, b, 1.4 * size, -13)]);
-    } else if (part.kind === "slider")
-      set(0, [
-        beside(a, b, c, -19, -12),
-        beside(a, b, c, 19, -12),
-        beside(a, b, c, 19, 12),
-        beside(a, b, c, -19, 12),
-      ]);
-    else {
-      // from the block to a wall beyond the end of the guide
-      const start = beside(a, b, c, 19, part.kind === "spring" ? 6 : -6);
-      const size = Math.hypot(c[0] - start[0], c[1] - start[1]);
-      if (part.kind === "spring") {
-        const turns = Array.from({ length: 13 }, (_, i): Point => [0.1 + (0.8 * i) / 12, i % 2 ? 5 : -5]);
-        const all: Point[] = [[0, 0], [0.1, 0], ...turns, [0.9, 0], [1, 0]];
-        set(
-          0,
-          all.map(([share, left]) => beside(start, b, c, share * size, left)),
-        );
-      } else {
-        const on = (along: number, left: number): Point => beside(start, b, c, along * size, left);
-        set(0, [on(0, 0), on(0.5, 0), on(0.5, 5), on(0.5, -5)]);
-        set(1, [on(0.4, 6), on(0.7, 6), on(0.7, 0), on(1, 0), on(0.7, 0), on(0.7, -6), on(0.4, -6)]);
-      }
-    }
   }
 
   private seen(rows: Float64Array, start: number, joint: number): Point {

@@ -1,14 +1,6 @@
 /** How far the slider swings over the speed, or over what else varies: stable and unstable motions, folds, doublings, what to avoid. */
 
-import {
-  interpolateAmplitude,
-  type Arc,
-  splitArcs,
-  type Avoided,
-  type Interval,
-  findJumps,
-  rangesToAvoid,
-} from "./avoid";
+import { type Arc, splitArcs, type Avoided, type Interval, findJumps, rangesToAvoid } from "./avoid";
 import { make } from "./elements";
 import type { Found } from "./explore";
 import type { Point } from "./motions";
@@ -201,13 +193,5 @@ export class Response extends Search {
     const now = givenValue(this.axes[0].given!, this.context!.values);
     this.set(now + (sense * (shiftKey ? 10 : 1) * (high - low)) / 200);
     return true;
-  }
-
-  /** The amplitude on the stable arcs at a value; for scripts. */
-  amplitudes(value: number): number[] {
-    const inside = this.arcs.filter(
-      ({ points }) => points[0].value <= value && value <= points[points.length - 1].value,
-    );
-    return inside.map((arc) => interpolateAmplitude(arc, value));
   }
 }

@@ -15,9 +15,8 @@ export interface Given {
   nominal?: number;
   /** Words by value, where only some values are allowed. */
   choices?: Record<string, string>;
-  /** Of a mode: what chooses each value in a case file, and the value without any. */
+  /** Of a mode: what chooses each value in a case file. */
   arguments?: string[];
-  default?: number;
   /** Of an input: its name in a case file, among the inputs of a run, and the freedom that it drives. */
   file?: string;
   argument?: string;
@@ -112,7 +111,6 @@ export interface Mechanism {
 }
 
 export interface Tables {
-  version: string;
   /** Margin of the largest multiplier from which on a verdict is given. */
   tolerance: number;
   mechanisms: Mechanism[];

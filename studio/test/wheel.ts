@@ -19,7 +19,6 @@ export const WHEEL: Mechanism = {
       start: 1,
       choices: { "0": "torque", "1": "speed" },
       arguments: ["torque", "speed"],
-      default: 1,
     },
     { ...plain, name: "initial.angle", reference: 2, start: 0 },
     { ...plain, name: "initial.speed", reference: 3, start: 2 },
@@ -47,7 +46,7 @@ export const WHEEL: Mechanism = {
 export const points = (text: string): [number, number][] =>
   text.split(", ").map((pair) => pair.split(" ").map(Number) as [number, number]);
 
-export const TABLES: Tables = { version: "0", tolerance: 1e-6, mechanisms: [WHEEL] };
+export const TABLES: Tables = { tolerance: 1e-6, mechanisms: [WHEEL] };
 
 export const STATE: State = {
   mechanism: "wheel",

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+from analysis.files import write_text
 from analysis.mechanisms import register
-from analysis.studio import PAGE
+from analysis.studio import PAGE, make_page
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
@@ -30,9 +31,9 @@ def registered() -> None:
         register(module.MECHANISM)
 
 
-def opened(browser: Browser, path: Path) -> Page:
-    """Open a page of the studio, paused; an error of the page fails the test."""
-    made = browser.new_page(viewport={"width": 1400, "height": 1000})
+def opened(browser: Browser, path: Path, **options: Any) -> Page:
+    """Open a page of the studio, paused; an error of the page fails the test. ``options`` are those of the browser."""
+    made = browser.new_page(**{"viewport": {"width": 1400, "height": 1000}} | options)
     made.set_default_timeout(600_000)
     made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
     made.goto(path.as_uri())
@@ -47,6 +48,21 @@ def page(browser: Browser) -> Iterator[Page]:
     made = opened(browser, PAGE)
     yield made
     made.close()
+
+
+@pytest.fixture
+def open_page(browser: Browser, tmp_path: Path) -> Iterator[Callable[..., Page]]:
+    """Return a function that opens the built page, or one with the mechanism of a state, and `opened`'s options."""
+    pages: list[Page] = []
+
+    def open_one(state: Mapping[str, Any] | None = None, **options: Any) -> Page:
+        path = PAGE if state is None else write_text(tmp_path / "page.html", make_page(state))
+        pages.append(opened(browser, path, **options))
+        return pages[-1]
+
+    yield open_one
+    for page in pages:
+        page.close()
 
 
 @pytest.fixture

@@ -13,9 +13,8 @@ from analysis.linkages import linkage
 from analysis.mechanisms import PUBLISHED, find_mechanism
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
 from analysis.run import Case, InductionMotor, Inputs, load_case, read_case, simulate
-from analysis.studio import make_page, page_case, page_state
+from analysis.studio import page_case, page_state
 from benchmarks.studio import figures_in_words, measure_page
-from tests.analysis.conftest import opened
 from tests.analysis.test_linkages import coupled
 from tests.analysis.test_several_freedoms import SHAKER
 from tests.analysis.test_studio import _HELD, OWN, _load, _near, _saved, _varied, in_browser
@@ -85,7 +84,7 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
 
 
 @in_browser
-def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_path: Path) -> None:
+def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(open_page: Any) -> None:
     """A pendulum on a yoke hangs still, or swings at the speed of the crank up to a branch point."""
     parameters = replace(yoke("yoke-in-the-page").parameters, hinge_damping=1e-4)
     mechanism = find_mechanism(parameters)
@@ -93,8 +92,7 @@ def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_p
     initial = mechanism.initial(**dict(zip(mechanism.freedoms[1].initial, swinging.start.tolist())))
     inputs = Drive(speed=6.6).inputs(mechanism)
     case = Case(title="", parameters=parameters, initial=initial, inputs=inputs, stop_time=1.0)
-    (tmp_path / "yoke.html").write_text(make_page(page_state(case)), encoding="utf-8")
-    page = opened(browser, tmp_path / "yoke.html")
+    page = open_page(page_state(case))
     # beside those of the house: a linkage that Python finds for a path is one of them
     assert {*OWN, mechanism.name} == set(page.evaluate("window.studio.tables.mechanisms.map((one) => one.name)"))
     _explored(page, "response", {"What varies": (6.6 / RPM, 7.2 / RPM)})
@@ -105,7 +103,6 @@ def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_p
     assert not any(point["kind"] for point in [*swings, *hangs])
     assert not any(point["amplitudes"][0] for point in hangs)
     assert not page.locator(".told").filter(has_text="Fold at").count()
-    page.close()
 
 
 def _supported(law: Any, **constants: Any) -> Any:
@@ -144,7 +141,7 @@ _PLAY = [("-6 mm", "-40 N"), ("-1 mm", "0 N"), ("1 mm", "0 N"), ("6 mm", "40 N")
     ids=["stop", "play", "coupling", "arm"],
 )
 def test_motions_over_kinks_and_of_links_that_turn_are_pythons(
-    browser: Any, tmp_path: Path, built: Callable[[], Any], speeds: tuple[float, ...]
+    open_page: Any, built: Callable[[], Any], speeds: tuple[float, ...]
 ) -> None:
     made = built().mechanism()
     parameters = made.first_set.parameters
@@ -152,37 +149,32 @@ def test_motions_over_kinks_and_of_links_that_turn_are_pythons(
     for speed in speeds:
         inputs = Drive(speed=speed * RPM).inputs(made)
         states.append(page_state(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
-    (tmp_path / "own.html").write_text(make_page(states[0]), encoding="utf-8")
-    page = opened(browser, tmp_path / "own.html")
+    page = open_page(states[0])
     found = [_load(page, state)["answer"]["orbit"] for state in states][-1]
     assert found["found"], found["sentence"]
     wanted = newton_orbit(parameters, Drive(speed=speeds[-1] * RPM), start=found["start"])
     _near(found["start"], wanted.start)
     assert max(abs(complex(*pair)) for pair in found["multipliers"]) == pytest.approx(wanted.largest, rel=1e-6)
-    page.close()
 
 
 @in_browser
-def test_another_crank_turns_as_often_as_the_speeds_at_the_start_say(browser: Any, tmp_path: Path) -> None:
+def test_another_crank_turns_as_often_as_the_speeds_at_the_start_say(open_page: Any) -> None:
     example = Path(__file__).parents[2] / "examples" / "linkages" / "two-crank-five-bar.toml"
     case = load_case(example, {"rightDrive.torque": 0.0, "initial.right_speed": "240 rpm"})
-    (tmp_path / "two.html").write_text(make_page(page_state(case)), encoding="utf-8")
-    page = opened(browser, tmp_path / "two.html")
+    page = open_page(page_state(case))
     found = _load(page, page_state(case))["answer"]["orbit"]
     wanted = newton_orbit(
         case.parameters, steady_drive(case.parameters, case.inputs, case.initial), start=found["start"]
     )
     assert wanted.drive.ratios == {"right.angle": 2}
     _near(found["start"], wanted.start)
-    page.close()
 
 
 @in_browser
-def test_every_coordinate_has_its_ranges_to_avoid(browser: Any, tmp_path: Path) -> None:
+def test_every_coordinate_has_its_ranges_to_avoid(open_page: Any, tmp_path: Path) -> None:
     (tmp_path / "shaker.toml").write_text(SHAKER, encoding="utf-8")
     case = load_case(tmp_path / "shaker.toml", {"run.stop_time": 1.0})
-    (tmp_path / "shaker.html").write_text(make_page(page_state(case)), encoding="utf-8")
-    page = opened(browser, tmp_path / "shaker.html")
+    page = open_page(page_state(case))
     _explored(page, "response", {"What varies": (300.0, 900.0)})
     found = page.evaluate("window.studio.charts.response.avoided")
     wanted = frequency_response(case.parameters, 300.0 * RPM, 900.0 * RPM, doublings=0).speeds_to_avoid
@@ -200,7 +192,6 @@ def test_every_coordinate_has_its_ranges_to_avoid(browser: Any, tmp_path: Path) 
     share = (point["value"] / RPM - 300.0) / 600.0
     canvas.click(position={"x": 58 + (box["width"] - 70) * share, "y": 10 + (box["height"] - 50) * 0.08 / 1.08})
     assert page.evaluate("window.studio.state.values['drive.speed']") == pytest.approx(point["value"], rel=1e-2)
-    page.close()
 
 
 @in_browser

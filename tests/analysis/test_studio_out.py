@@ -20,7 +20,6 @@ from analysis.run import Case, Inputs
 from analysis.studio import PAGE, opening_state, page_address, page_state
 
 from ..scripts import script_of_docs
-from .conftest import opened
 from .test_studio import _drag, _given, _load, _pin, _saved, _settled, in_browser
 
 ROOT = Path(__file__).parents[2]
@@ -76,8 +75,8 @@ def test_start_values_for_the_fmu_are_parameter_values_of_ssp(page: Any, state: 
 
 
 @in_browser
-def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:
-    page = opened(browser, PAGE)
+def test_a_link_holds_the_view_and_a_bad_one_is_said(open_page: Any) -> None:
+    page = open_page()
     _load(page, _spatial())
     page.keyboard.press("2")
     page.keyboard.press("+")
@@ -94,7 +93,6 @@ def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:
     page.wait_for_function("window.studio.state.title === 'spatial'")
     assert page.evaluate("window.studio.picture.view.kept") == kept
     assert page.evaluate("window.studio.state.values") == _spatial()["values"]
-    page.close()
 
 
 # What is put behind
@@ -348,16 +346,15 @@ def test_links_are_told_apart_without_colour_vision() -> None:
 
 
 @in_browser
-def test_what_the_documentation_links_to_opens(browser: Any) -> None:
+def test_what_the_documentation_links_to_opens(open_page: Any) -> None:
     openings = script_of_docs("openings")
-    page = opened(browser, PAGE)
+    page = open_page()
     for name, state in openings.states().items():
         with _settled(page):
             page.evaluate("address => { location.href = address }", page_address(state, PAGE.as_uri()))
         assert page.inner_text("#title") == state["title"], name
         assert page.inner_text("#fault") == "", name
         assert page.evaluate("window.studio.shown().rows.count") > 1, name
-    page.close()
 
 
 @pytest.fixture(scope="module")
@@ -398,16 +395,12 @@ def test_the_sources_of_the_page_are_typed_tidy_and_tested(sources: Path, script
 @in_browser
 @pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_reader_of_the_screen_finds_its_way(browser: Any, sources: Path, size: Any, theme: str) -> None:
+def test_a_reader_of_the_screen_finds_its_way(open_page: Any, sources: Path, size: Any, theme: str) -> None:
     """What axe-core finds: all that is wrong with names, roles and contrast."""
-    page = browser.new_page(viewport=size, color_scheme=theme)
-    page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
-    page.click("#play")
+    page = open_page(viewport=size, color_scheme=theme)
     page.add_script_tag(path=sources / "node_modules" / "axe-core" / "axe.min.js")
     for state in (opening_state(), _spatial()):
         _load(page, state)
         page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true })")
         found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
         assert [(one["id"], [node["html"] for node in one["nodes"]][:3]) for one in found] == []
-    page.close()

@@ -1,7 +1,6 @@
 """The studio's page in a browser: what it says in every state, how its charts and controls look, what a fault leaves."""
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,17 +8,14 @@ import pytest
 
 from analysis.studio import PAGE, opening_state, page_address
 
-from .conftest import opened
 from .test_studio import _drag, _given, _load, _pin, _shown, in_browser
 
 UNDO = "!document.getElementById('undo').disabled"
 
 
 @pytest.fixture
-def page(browser: Any) -> Iterator[Any]:
-    made = opened(browser, PAGE)
-    yield made
-    made.close()
+def page(open_page: Any) -> Any:
+    return open_page()
 
 
 def _settle(page: Any) -> None:
@@ -53,25 +49,19 @@ def test_curves_are_told_apart_in_the_legend_and_axes_have_names(page: Any) -> N
 
 
 @in_browser
-def test_marks_of_axes_are_written_as_all_numbers_in_every_language(browser: Any) -> None:
-    page = browser.new_page(locale="de-DE")
-    page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
+def test_marks_of_axes_are_written_as_all_numbers_in_every_language(open_page: Any) -> None:
+    page = open_page(locale="de-DE")
     axes = "window.studio.charts.charts.charts.map(({ plot }) => plot.axes[1]"
     assert all(len(marks) > 1 for marks in page.evaluate(f"{axes}._values)"))
     assert page.evaluate(f"{axes}.values(plot, [0.25, -10000, 2e6]))")[0] == ["0.25", "-10000", "2e6"]
-    page.close()
 
 
 @in_browser
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_curves_have_the_colours_of_the_theme(browser: Any, theme: str) -> None:
-    page = browser.new_page(color_scheme=theme)
-    page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
+def test_curves_have_the_colours_of_the_theme(open_page: Any, theme: str) -> None:
+    page = open_page(color_scheme=theme)
     accent = page.evaluate("getComputedStyle(document.body).getPropertyValue('--accent')")
     assert page.evaluate("window.studio.charts.charts.charts[0].plot.series[1].stroke()") == accent
-    page.close()
 
 
 @in_browser
