@@ -328,16 +328,8 @@ def test_links_are_told_apart_without_colour_vision() -> None:
             seen = {name: lab(np.clip(matrix @ colour[name], 0, 1)) for name in ("crank", "coupler", "rocker")}
             for a, b in (("crank", "coupler"), ("crank", "rocker"), ("coupler", "rocker")):
                 assert np.linalg.norm(seen[a] - seen[b]) > 20, (kind, a, b)
-        curves = [(f"curve{n}", 3) for n in range(6)]
-        for name, least in (
-            ("crank", 3),
-            ("coupler", 3),
-            ("rocker", 3),
-            ("text", 7),
-            ("soft", 4.5),
-            ("bad", 4.5),
-            *curves,
-        ):
+        lines = ("crank", "coupler", "rocker", *(f"curve{n}" for n in range(6)))
+        for name, least in (dict.fromkeys(lines, 3) | {"text": 7, "soft": 4.5, "bad": 4.5}).items():
             pair = sorted([card, to_xyz[1] @ colour[name]])
             assert (pair[1] + 0.05) / (pair[0] + 0.05) >= least, name
 

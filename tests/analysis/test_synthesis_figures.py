@@ -33,6 +33,8 @@ LINKAGE = syn.Linkage(
 #: It cannot turn fully: the longest link and the shortest are more than the other two.
 SWINGING = replace(LINKAGE, crank_length=0.25, ground_length=0.35)
 SLIDING = replace(LINKAGE, pivot=syn.SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))
+#: Of plates: what is given but for the linkage.
+PLATES = {"width": 0.02, "thickness": 0.005, "pin": 0.008}
 GEARED = LINKAGE.with_pivot(syn.SecondCrank(0.02, 2.0, 0.3))
 
 
@@ -349,7 +351,7 @@ def test_every_layer_is_seen_on_white_and_on_black(tmp_path) -> None:
 
 
 def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
-    cut = syn.plates(timed(), width=0.02, thickness=0.005, pin=0.008, title="plates")
+    cut = syn.plates(timed(), **PLATES, title="plates")
     document = ezdxf.readfile(save_drawing(tmp_path / "p.dxf", cut))
     assert not document.audit().errors
     space = document.modelspace()
@@ -395,21 +397,18 @@ def flatten(outline) -> np.ndarray:
 
 
 def test_plates_of_other_kinds() -> None:
-    names = {t.text.split(":")[0] for t in syn.plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts}
-    assert {"ground", "second crank", "crank", "coupler", "rocker"} <= names
-    assert any(
-        "geared 2 : 1 to the first" in t.text
-        for t in syn.plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts
-    )
-    assert not any("ground" in t.text for t in syn.plates(timed(SLIDING), width=0.02, thickness=0.005, pin=0.008).texts)
-    two = syn.plates(rocker(), width=0.02, thickness=0.005, pin=0.008)
+    texts = [t.text for t in syn.plates(timed(GEARED), **PLATES).texts]
+    assert {"ground", "second crank", "crank", "coupler", "rocker"} <= {text.split(":")[0] for text in texts}
+    assert any("geared 2 : 1 to the first" in text for text in texts)
+    assert not any("ground" in t.text for t in syn.plates(timed(SLIDING), **PLATES).texts)
+    two = syn.plates(rocker(), **PLATES)
     assert len(two.circles) == 8
     with pytest.raises(ParameterError, match="below the width"):
         syn.plates(timed(), width=0.02, thickness=0.005, pin=0.02)
 
 
 def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
-    text = save_drawing(tmp_path / "p.svg", syn.plates(timed(), width=0.02, thickness=0.005, pin=0.008)).read_text()
+    text = save_drawing(tmp_path / "p.svg", syn.plates(timed(), **PLATES)).read_text()
     # half circles, to the left in a drawing whose y points down
     assert "A 10 10 0 0 0" in text
     assert ">50</text>" in text
@@ -430,14 +429,6 @@ def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
 
 
 # Tables and report
-
-
-def test_the_columns_of_a_timed_path() -> None:
-    solution = timed()
-    c = solution.columns()
-    np.testing.assert_array_equal(c["crank rotation [rad]"], PHI)
-    made = np.column_stack([c["path x [m]"], c["path y [m]"]])
-    np.testing.assert_allclose(c["error [m]"], np.hypot(*(made - ELLIPSE).T))
 
 
 @pytest.mark.parametrize("closed", [True, False])
@@ -540,7 +531,7 @@ def test_plates_too_short_for_their_holes_say_so() -> None:
     short = timed(replace(LINKAGE, crank_length=0.007))
     assert syn.crowded_plates(short, 0.008) == ("crank",)
     assert syn.crowded_plates(short, 0.006) == ()
-    texts = [t.text for t in syn.plates(short, width=0.02, thickness=0.005, pin=0.008).texts]
+    texts = [t.text for t in syn.plates(short, **PLATES).texts]
     assert [text.partition(":")[0] for text in texts if "overlap" in text] == ["crank"]
 
 
