@@ -122,12 +122,9 @@ def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dic
         "section": DRIVE if mode or channel else _section(mechanism, variable),
         **_unit(variable),
     }
-    if variable.minimum is not None:
-        row["least"] = float(variable.minimum)
-    if variable.nominal is not None:
-        row["nominal"] = variable.nominal
-    if variable.role:
-        row["role"] = variable.role
+    least = None if variable.minimum is None else float(variable.minimum)
+    there = {"least": least, "nominal": variable.nominal, "role": variable.role or None}
+    row |= {name: value for name, value in there.items() if value is not None}
     if mode is not None:
         row["choices"] = {str(value): words for value, words in enumerate(mode.values)}
         row["arguments"] = list(mode.arguments)
@@ -135,9 +132,7 @@ def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dic
         row["choices"] = {"1": "+1", "-1": "-1"}
     if channel is not None:
         row["file"] = name_in_files(mechanism, channel)
-        row["argument"] = channel.argument
-        row["kind"] = channel.kind
-        row["freedom"] = channel.freedom
+        row |= {"argument": channel.argument, "kind": channel.kind, "freedom": channel.freedom}
     return row
 
 
@@ -212,10 +207,9 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
             for joint in drawing.joints
         ],
         "parts": [
-            {
-                "kind": part.kind,
+            part._asdict()
+            | {
                 "joints": [number[name] for name in part.joints],
-                "text": part.text,
                 "where": reference[part.where] if part.where else -1,
             }
             for part in drawing.parts
@@ -244,12 +238,8 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
 
     def outputs(title: str, kind: str, output_names: list[str]) -> dict[str, Any]:
         unit = _unit(variables[output_names[0]]) if output_names else watt
-        return {
-            "title": title,
-            "kind": kind,
-            **unit,
-            "curves": [{"name": n, "of": [names.index(n)]} for n in output_names],
-        }
+        curves = [{"name": n, "of": [names.index(n)]} for n in output_names]
+        return {"title": title, "kind": kind, **unit, "curves": curves}
 
     forces = [{"name": joint, "of": [names.index(name) for name in parts]} for joint, parts in mechanism.joints.items()]
     turning = [
