@@ -224,8 +224,13 @@ def resize(figure: style.Figure, width: float, height: float) -> style.Figure:
 
 @singledispatch
 def draw_part(part: Any, figure: style.Figure, axis: Axes) -> None:
-    """Draw a part of a picture on the given axes: a panel, or another kind of part for which a function is registered."""
-    draw_panel(axis, part)
+    """Draw a part of a picture on the given axes; a function is registered for each kind of part."""
+    raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
+
+
+@draw_part.register
+def _(panel: Panel, figure: style.Figure, axis: Axes) -> None:
+    draw_panel(axis, panel)
 
 
 def _name_few_decades(axis: Axis) -> None:

@@ -103,8 +103,14 @@ def picture(result: Any, *details: Any, **options: Any) -> Any:
 
     Parameters
     ----------
-    result, *details, **options
-        As for `plot`: a response, a branch, a chart, basins.
+    result : object
+        A response, a branch, a chart, basins.
+    *details, **options
+        As for `plot`.
+
+    Returns
+    -------
+    Picture
 
     Raises
     ------

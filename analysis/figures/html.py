@@ -46,8 +46,10 @@ def to_html(result: Any, *details: Any, **options: Any) -> str:
 
     Parameters
     ----------
-    result, *details, **options
-        As for `picture`; or a `Picture`.
+    result : object
+        A response, a branch, a stability chart, basins; or a `Picture`.
+    *details, **options
+        As for `plot`.
 
     Returns
     -------

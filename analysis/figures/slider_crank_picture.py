@@ -495,8 +495,14 @@ def plot_range(
     parameters : SliderCrankParameters
     law : PeriodicShift, optional
         The shift over the crank angle; by default zero.
-    unit, title
-        As for `plot_mechanism`, with the same error.
+    unit : str
+        One of `UNITS`.
+    title : str
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown.
     """
     law = constant_shift(0.0) if law is None else law
     factor = _factor(unit)

@@ -1,10 +1,13 @@
 """The studio: what is taken out of it and put behind it, views, touch, readers of the screen, and the sources of the page."""
 
+import functools
+import http.server
 import os
 import re
 import shutil
 import subprocess
 import sysconfig
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -347,6 +350,23 @@ def test_what_the_documentation_links_to_opens(open_page: Any) -> None:
         assert page.inner_text("#title") == state["title"], name
         assert page.inner_text("#fault") == "", name
         assert page.evaluate("window.studio.shown().rows.count") > 1, name
+
+
+@in_browser
+def test_the_page_works_from_a_plain_web_server(browser: Any) -> None:
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=PAGE.parent)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            made = browser.new_page()
+            made.goto(f"http://127.0.0.1:{server.server_port}/{PAGE.name}")
+            made.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
+            assert "stable" in made.inner_text("#floquet")
+            made.close()
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 @pytest.fixture(scope="module")
