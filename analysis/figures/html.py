@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import singledispatch
 from html import escape
 from math import ceil, isfinite, log10
 from typing import Any
@@ -79,7 +80,7 @@ def to_plotly(picture: Picture) -> dict[str, Any]:
     figure = _Figure(picture, heights)
     for number, part in enumerate(picture.parts):
         axes = _Axes(figure, number)
-        (_add_map if isinstance(part, HeatMap) else _add_panel)(part, axes)
+        _add_part(part, axes)
         if not picture.heights or number + columns >= len(picture.parts):
             axes.x["title"] = {"text": _line(getattr(part, "panel", part).x_label)}
     return {"data": figure.traces, "layout": figure.layout, "config": {"displaylogo": False}}
@@ -178,7 +179,14 @@ def _hover_template(title: str, names: Iterable[str], hover: Mapping[str, Any]) 
     return "<br>".join([*head, *lines]) + "<extra></extra>"
 
 
-def _add_panel(panel: Panel, axes: _Axes) -> None:
+@singledispatch
+def _add_part(part: Any, axes: _Axes) -> None:
+    """Add a part of a picture to axes; a function is registered for each kind of part."""
+    raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
+
+
+@_add_part.register
+def _(panel: Panel, axes: _Axes) -> None:
     legend = axes.legend_group(panel.legend or panel.title or panel.y_label)
     for boundaries in panel.filled:
         ring = np.vstack([np.vstack([r, r[:1], [[np.nan] * 2]]) for r in boundaries])
@@ -253,7 +261,8 @@ def _trace(curve: Curve, colour: str, panel: Panel) -> dict[str, Any]:
     return trace
 
 
-def _add_map(part: HeatMap, axes: _Axes) -> None:
+@_add_part.register
+def _(part: HeatMap, axes: _Axes) -> None:
     values = np.ma.filled(np.ma.masked_invalid(part.values), np.nan)
     hover = part.hover or {part.label: values}
     columns = [[_json_values(row) for row in np.asarray(v)] for v in hover.values()]
@@ -274,7 +283,7 @@ def _add_map(part: HeatMap, axes: _Axes) -> None:
         key = {"symbol": "square", "size": 12, "color": _hex(colour), "line": {"width": 1, "color": _hex(MARKED)}}
         legend = axes.legend_group(part.panel.title or part.label)
         axes.add_trace(type="scatter", x=[None], y=[None], mode="markers", marker=key, name=escape(name), **legend)
-    _add_panel(part.panel, axes)
+    _add_part(part.panel, axes)
     axes.x["showgrid"] = axes.y["showgrid"] = False
 
 
