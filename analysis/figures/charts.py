@@ -178,31 +178,16 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
         else:
             colour, multiplier = marks[traced.kind]
             line, label = "--", f"{traced.motion}, multiplier {multiplier}"
-        curves.append(
-            Curve(
-                x=x.factor * traced.points[:, 0],
-                y=y.factor * traced.points[:, 1],
-                colour=colour,
-                line=line,
-                label="" if label in named else label,
-            )
-        )
+        points = traced.points * [x.factor, y.factor]
+        entry = "" if label in named else label
+        curves.append(Curve(x=points[:, 0], y=points[:, 1], colour=colour, line=line, label=entry))
         named.add(label)
+    look: dict[str, Any] = {"colour": "0.1", "hollow": True, "line": "", "order": 4.0, "cut": False}
     for outcome in dict.fromkeys(run.confirmation.outcome for run in chart.runs):
         those = [run for run in chart.runs if run.confirmation.outcome is outcome]
-        curves.append(
-            Curve(
-                x=[x.factor * run.x for run in those],
-                y=[y.factor * run.y for run in those],
-                colour="0.1",
-                hollow=True,
-                line="",
-                marker={Outcome.DECAYS: "o", Outcome.GROWS: "X", Outcome.BOUNDED: "s"}[outcome],
-                order=4.0,
-                cut=False,
-                label=f"long run {outcome.value}",
-            )
-        )
+        at = np.array([(x.factor * run.x, y.factor * run.y) for run in those])
+        marker = {Outcome.DECAYS: "o", Outcome.GROWS: "X", Outcome.BOUNDED: "s"}[outcome]
+        curves.append(Curve(x=at[:, 0], y=at[:, 1], marker=marker, label=f"long run {outcome.value}", **look))
     low, high = (np.array([chart.box.x[i], chart.box.y[i]]) * [x.factor, y.factor] for i in (0, 1))
     panel = Panel(
         x_label=label_in_words(x.label),
@@ -270,23 +255,16 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
     shown, factor = display_scale(found.motions[0].swing[1])
     name, varied = flow.components[0][0], name_in_words(flow.components[place][0])
     curves = []
-    for stable, marker in ((True, "o"), (False, "x")):
-        those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]
+    for label, marker in (("stable motion", "o"), ("unstable motion", "x")):
+        those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == (marker == "o")]
         if those:
-            curves.append(
-                Curve(
-                    x=[scale * _nearest_turn(found, orbit.start[place]) for orbit in those],
-                    y=[orbit.start[half + place] for orbit in those],
-                    line="",
-                    marker=marker,
-                    colour="0.05",
-                    label="stable motion" if stable else "unstable motion",
-                    hover={
-                        f"amplitude of {name_in_words(name)} [{shown}]": [factor * orbit.amplitude for orbit in those],
-                        "largest multiplier": [orbit.largest for orbit in those],
-                    },
-                )
-            )
+            hover = {
+                f"amplitude of {name_in_words(name)} [{shown}]": [factor * orbit.amplitude for orbit in those],
+                "largest multiplier": [orbit.largest for orbit in those],
+            }
+            x = [scale * _nearest_turn(found, orbit.start[place]) for orbit in those]
+            y = [orbit.start[half + place] for orbit in those]
+            curves.append(Curve(x=x, y=y, line="", marker=marker, colour="0.05", label=label, hover=hover))
     panel = Panel(
         x_label=f"{varied} at crank angle 0{', all else as in motion 1' if found.fixed else ''} [{drawn}]",
         y_label=label_in_words(found.labels[1]),

@@ -19,6 +19,8 @@ from .style import HAIR, MARK, MARKED, TINY, Figure
 
 #: Matplotlib's gid of vertical lines and their names, and of the texts of points.
 _GID, _LABEL = "mark", "label"
+#: Look of both, whose places are offsets from what they name.
+_TEXT: dict[str, Any] = {"textcoords": "offset points", "fontsize": TINY, "color": MARKED}
 #: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -40,35 +42,15 @@ _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
 def mark_place(axis: Axes, place: float, text: str) -> None:
     """Draw a vertical dotted line at ``place`` along x with a name, which `place_marks` moves to a free place."""
     axis.axvline(place, gid=_GID, **MARK)
-    axis.annotate(
-        text,
-        (place, 1.0),
-        xycoords=("data", "axes fraction"),
-        xytext=(-_GAP, -3.0),
-        textcoords="offset points",
-        rotation=90,
-        ha="right",
-        va="top",
-        fontsize=TINY,
-        color=MARKED,
-        gid=_GID,
-    )
+    upright: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "top", "gid": _GID}
+    axis.annotate(text, (place, 1.0), (-_GAP, -3.0), xycoords=("data", "axes fraction"), **_TEXT | upright)
 
 
 def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
     """Write a text beside a point and a line from it to the point; `place_marks` moves the text to a free place."""
-    axis.annotate(
-        text,
-        place,
-        xytext=(_DISTANCES[0], _DISTANCES[0]),
-        textcoords="offset points",
-        va="center",
-        fontsize=TINY,
-        color=MARKED,
-        gid=_LABEL,
-        arrowprops={"arrowstyle": "-", "color": MARKED, "linewidth": HAIR, "shrinkA": 1.0, "shrinkB": 3.0},
-        zorder=5,
-    )
+    leader = {"arrowstyle": "-", "color": MARKED, "linewidth": HAIR, "shrinkA": 1.0, "shrinkB": 3.0}
+    beside = (_DISTANCES[0], _DISTANCES[0])
+    axis.annotate(text, place, beside, arrowprops=leader, va="center", gid=_LABEL, zorder=5, **_TEXT)
 
 
 @dataclass(frozen=True, slots=True)

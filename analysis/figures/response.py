@@ -352,6 +352,7 @@ def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **o
 def _special_points(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
     """Return the special points of all branches as markers, one curve per kind."""
     curves = []
+    style: dict[str, Any] = {"colour": "black", "line": "", "hollow": True, "order": 4.0}
     says = {jump.parameter: _jump(jump, look).replace("\n", " ") for jump in found}
     for kind, (marker, _) in _MARKERS.items():
         those = [(n, b, s) for n, b in enumerate(branches, start=1) for s in b.special if s.kind is kind]
@@ -362,19 +363,9 @@ def _special_points(branches: Sequence[Branch], look: _Scale, found: Sequence[Fo
                 "largest multiplier": [s.orbit.largest for _, _, s in those],
                 "here": [says.get(s.parameter, "") if kind is Crossing.FOLD else "" for _, _, s in those],
             }
-            curves.append(
-                Curve(
-                    x=[look.factor * s.parameter for _, _, s in those],
-                    y=[look.scale * s.orbit.amplitude for _, _, s in those],
-                    label=kind.value,
-                    colour="black",
-                    line="",
-                    marker=marker,
-                    hollow=True,
-                    order=4.0,
-                    hover=hover,
-                )
-            )
+            x = [look.factor * s.parameter for _, _, s in those]
+            y = [look.scale * s.orbit.amplitude for _, _, s in those]
+            curves.append(Curve(x=x, y=y, label=kind.value, marker=marker, hover=hover, **style))
     return curves
 
 
@@ -383,17 +374,9 @@ def _legend_entries(branches: Sequence[Branch]) -> list[Curve]:
     turns = sorted({(branch.periods, branch.crank_turns) for branch in branches})
     words = {str(word) for branch in branches for word in _stability_words(branch)}
     keys = []
-    if len(turns) > 1:
-        keys += [
-            Curve(
-                x=[],
-                y=[],
-                colour=COLOURS[(n.bit_length() - 1) % len(COLOURS)],
-                label=f"period of {format_turns(shown)}",
-                marker="" if n == 1 else f"${shown}$",
-            )
-            for n, shown in turns
-        ]
+    for n, shown in turns if len(turns) > 1 else []:
+        colour, marker = COLOURS[(n.bit_length() - 1) % len(COLOURS)], "" if n == 1 else f"${shown}$"
+        keys.append(Curve(x=[], y=[], colour=colour, label=f"period of {format_turns(shown)}", marker=marker))
     colour = "0.3" if len(turns) > 1 else COLOURS[0]
     keys += [
         Curve(x=[], y=[], colour=colour, line=line, label=f"{word.value} motion")

@@ -100,19 +100,11 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     edges = [LineString(patch.get_path().vertices) for patch in axis.patches]
     drawn = [shape for shape in (*lines, *edges) if np.isfinite(shape.bounds).all()]
     taken = list(pins.values())
+    look: dict[str, Any] = {"fontsize": style.SMALL, "color": style.MARKED, "ha": "center", "va": "center", "zorder": 7}
     for name, pin in pins.items():
         place = roomiest_position(pin, 1.7 * unit, drawn, taken)
         taken.append(place)
-        axis.text(
-            float(place[0]),
-            float(place[1]),
-            name,
-            fontsize=style.SMALL,
-            color=style.MARKED,
-            ha="center",
-            va="center",
-            zorder=7,
-        )
+        axis.text(float(place[0]), float(place[1]), name, **look)
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colour: str) -> None:
