@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis import Inputs, figures
+from analysis import Inputs, figures, find_orbit
 from analysis.figures import Curve, Panel
 from analysis.linear import (
     Design,
@@ -33,7 +33,6 @@ from analysis.linear import (
     linearise,
     linearise_orbit,
     predict_loop,
-    settled_motion,
 )
 from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
@@ -48,11 +47,9 @@ WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
 
 def turning(title: str, parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel, InitialState]:
     """Return the linear models along the motion at a constant crank speed, and the start of that motion; print a summary."""
-    inputs = Inputs(speed=speed)
-    motion = settled_motion(parameters, inputs)
-    th2, u, w2, v = motion[0, :4].tolist()
+    models = linearise_orbit(parameters, find_orbit(parameters, speed=speed))
+    th2, u, w2, v = models.states[0, :4].tolist()
     start = InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
-    models = linearise_orbit(parameters, motion, inputs)
     mean, travel = models.mean(), models.states[:, 1]
     print(title)
     print(f"  mean model: M {mean.M[0, 0]:.4f} kg, C {mean.C[0, 0]:.3f} N.s/m, K {mean.K[0, 0]:.1f} N/m")

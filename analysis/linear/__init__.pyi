@@ -30,5 +30,4 @@ from .periodic import LEAST_SAMPLES as LEAST_SAMPLES
 from .periodic import Orbit as Orbit
 from .periodic import PeriodicModel as PeriodicModel
 from .periodic import linearise_orbit as linearise_orbit
-from .periodic import settled_motion as settled_motion
 from .prediction import predict_loop as predict_loop

@@ -24,9 +24,8 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
 from ..libraries import lazy
-from ..mechanisms import variable_unit
-from ..run import Function, float_array, require_kind
-from ..units import Amount, in_si, si
+from ..run import float_array, require_kind
+from ..units import Amount, in_si
 from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude
 
 if TYPE_CHECKING:
@@ -145,29 +144,6 @@ class Design:
         kept = closed if self.integral_gain else closed[:n, :n]
         return sort_by_magnitude(np.linalg.eigvals(kept))
 
-    def continuous_law(self, reference: Amount) -> Function:
-        """Return the control law as a force for `analysis.run.Inputs` that depends continuously on the state, without sampling.
-
-        Raises
-        ------
-        DesignError
-            If the law has integral action, because the integral is not a function of the plant's state.
-        """
-        if self.integral_gain:
-            raise DesignError("a law with integral action is not a function of the state: run it with control_loop")
-        gains = tuple(self.plant_values(self.gains).tolist())
-        there: float = si(reference, variable_unit(self.model.mechanism, self.coordinate), "reference")
-        step = there - float(self.target[self.plant.place])
-        bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
-
-        def force(t: float, *x: float) -> float:
-            wanted = bias
-            for k in range(len(gains)):
-                wanted -= gains[k] * x[k]
-            return wanted
-
-        return Function(force)
-
     def plant_values(self, values: FloatArray) -> FloatArray:
         """Extend an array over the model's state to all coordinates and rates of the plant; the other entries are zero."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
@@ -187,19 +163,15 @@ class _Plant:
         self.b: FloatArray = model.B[:, [model.input_names.index(self.channel)]]
         self.place = model.layout.free.index(self.freedom)
 
-    def with_integral_state(self) -> tuple[FloatArray, FloatArray]:
-        """Return A and B with the integral of the coordinate as the last state."""
+    def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return A, B and the gains as a row, shape (1, states); the last state is the integral if its gain is not zero."""
+        if not integral_gain:
+            return self.a, self.b, gains[None, :]
         n = len(self.a)
         whole = np.zeros((n + 1, n + 1))
         whole[:n, :n] = self.a
         whole[n, self.place] = 1.0
-        return whole, np.vstack([self.b, [[0.0]]])
-
-    def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B and the gains as a row, shape (1, states); the last state is the integral if its gain is not zero."""
-        if integral_gain:
-            return *self.with_integral_state(), np.append(gains, integral_gain)[None, :]
-        return self.a, self.b, gains[None, :]
+        return whole, np.vstack([self.b, [[0.0]]]), np.append(gains, integral_gain)[None, :]
 
     def loop(self, gains: FloatArray, integral_gain: float) -> control.StateSpace:
         a, b, row = self.feedback_matrices(gains, integral_gain)

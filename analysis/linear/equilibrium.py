@@ -152,17 +152,8 @@ class Equilibrium:
 class _Balance:
     """Equilibrium equations: generalised forces on the free degrees of freedom, divided by the mechanism's scales.
 
-    Attributes
-    ----------
-    modes : tuple of int
-        Modes in which held degrees of freedom count as free, with no applied force: the unbalanced forces on them are the
-        holding forces.
-    its : Layout
-        Layout in these modes; ``its.free`` has the free and the held degrees of freedom.
-    free : list of int
-        Indices, in ``its.free``, of the degrees of freedom that are not held.
-    scale : ndarray
-        Scales of the coordinates of ``its.free``.
+    In ``modes`` held degrees of freedom count as free, with no applied force: the unbalanced forces on them are the holding
+    forces.
     """
 
     parameters: Parameters
@@ -170,9 +161,9 @@ class _Balance:
     inputs: Inputs
     channels: FloatArray
     modes: Modes
-    its: Layout
-    free: list[int]
-    scale: FloatArray
+    its: Layout  # in these modes; ``its.free`` has the free and the held degrees of freedom
+    free: list[int]  # indices, in ``its.free``, of the degrees of freedom that are not held
+    scale: FloatArray  # scales of the coordinates of ``its.free``
 
     @classmethod
     def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:

@@ -56,24 +56,16 @@ def signal_name(name: str) -> str:
 class Layout:
     """Free and commanded degrees of freedom of a mechanism, and the forces that act, in given modes.
 
-    Attributes
-    ----------
-    free, commanded : tuple of int
-        Indices of the degrees of freedom that forces move, and of those with commanded rates. A degree of freedom that is tied
-        to another one, as by a groove, is in neither.
-    forces : tuple of int
-        Indices of the channels whose forces act.
-    input_names : tuple of str
-        Inputs of a linear model: the forces, then the acceleration, speed and coordinate of each commanded degree of freedom.
-    state_names : tuple of str
-        States of a linear model: the free coordinates, then their rates.
+    A degree of freedom that is tied to another one, as by a groove, is neither free nor commanded.
     """
 
-    free: tuple[int, ...]
-    commanded: tuple[int, ...]
-    forces: tuple[int, ...]
-    input_names: tuple[str, ...]
-    state_names: tuple[str, ...]
+    free: tuple[int, ...]  # indices of the degrees of freedom that forces move
+    commanded: tuple[int, ...]  # indices of those with commanded rates
+    forces: tuple[int, ...]  # indices of the channels whose forces act
+    input_names: tuple[
+        str, ...
+    ]  # the forces, then acceleration, speed and coordinate of each commanded degree of freedom
+    state_names: tuple[str, ...]  # the free coordinates, then their rates
 
 
 @cache

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from math import isfinite, lcm, pi
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,9 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
-from ..files import Whole
-from ..mechanisms import InitialState, Parameters, find_mechanism
+from ..mechanisms import Parameters, find_mechanism
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, check_run, complete_initial_state, complete_inputs, simulate, speed_ratio, takes_published
+from ..run import Inputs, check_run, speed_ratio, takes_published
 from ..units import Amount, in_si
 from .model import (
     FloatArray,
@@ -41,34 +40,11 @@ BETWEEN, IN_ALL, RESOLVED = 2, 2048, 1e-2
 MOST_ITERATIONS = 60
 
 
-class Turn(Protocol):
-    """One period of a motion, sampled at equal steps of the crank angle, without the end point, such as `periodic.Turn`."""
-
-    @property
-    def time(self) -> FloatArray: ...
-
-    @property
-    def period(self) -> float: ...
-
-    @property
-    def states(self) -> FloatArray: ...
-
-    @property
-    def inputs(self) -> FloatArray:
-        """Values of the mechanism's channels at the n samples, shape (n, channels)."""
-        ...
-
-    @property
-    def modes(self) -> Modes:
-        """Values of the mechanism's modes."""
-        ...
-
-
 @runtime_checkable
 class Orbit(Protocol):
-    """A periodic motion that can be sampled, such as `analysis.periodic.PeriodicOrbit`."""
+    """A periodic motion that can be sampled at equal steps of the crank angle, such as `analysis.periodic.PeriodicOrbit`."""
 
-    def turn(self, samples: int, /) -> Turn: ...
+    def turn(self, samples: int, /) -> Any: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -290,7 +266,7 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     raise InputError("the period must be given: only at a constant prescribed speed does it follow from the states")
 
 
-def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
+def _resample(mechanism: Mechanism, turn: Any) -> tuple[FloatArray, FloatArray]:
     """Resample a period at equal time steps instead of equal steps of the crank angle; return the states and the channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T
@@ -341,81 +317,3 @@ def common_period(mechanism: Mechanism, speeds: Mapping[int, float]) -> float:
         ratio = speed_ratio(names[k], speeds[k], names[first], speeds[first])
         whole.append((ratio * Fraction(period / mechanism.freedoms[k].period).limit_denominator()).denominator)
     return lcm(*whole) * period / abs(speeds[first])
-
-
-@takes_published(inputs=complete_inputs, initial=complete_initial_state)
-def settled_motion(
-    parameters: Parameters, inputs: Inputs, *, initial: InitialState | None = None, samples: int = 128, turns: int = 200
-) -> FloatArray:
-    """Run a mechanism at constant speed for many turns; return the states of the last turn, after which the motion repeats.
-
-    With several cranks, a turn means the common period of the cranks.
-
-    Parameters
-    ----------
-    parameters
-        Parameters of the mechanism.
-    inputs : Inputs
-        Constant inputs with the speed of a cyclic degree of freedom, such as ``Inputs(speed=40.0)``.
-    initial : optional
-        Initial state of the run; by default all coordinates and all rates are zero, except the commanded speed.
-    samples : int
-        Number of states of the last turn, evenly spaced in time, without the end point.
-    turns : int
-        Number of turns of the run, at least two.
-
-    Returns
-    -------
-    ndarray, shape (samples, size)
-
-    Raises
-    ------
-    InputError
-        If the inputs are not constant or command no speed.
-    ParameterError
-        If ``samples`` or ``turns`` is no whole number, or less than 1 or 2.
-    LinearModelError
-        If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
-    """
-    mechanism = find_mechanism(parameters)
-    inputs, initial = check_run(mechanism, inputs, initial)
-    samples, turns = Whole(least=1)(samples, "samples"), Whole(least=2)(turns, "turns")
-    modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
-    its = layout(mechanism, modes)
-    speeds = {c.freedom: (c, getattr(inputs, c.argument)) for c in mechanism.channels if c.kind == "command"}
-    crank = next((k for k in its.commanded if mechanism.freedoms[k].period), None)
-    if crank is None or not inputs.held_exactly:
-        raise InputError(
-            f"{inputs}: a motion settles at a constant speed of a cyclic freedom, with all other inputs constant"
-        )
-    channel, speed = speeds[crank]
-    if not speed:
-        raise InputError(f"{channel.argument} is {speed}: it must be a finite number that is not zero")
-    turn = common_period(mechanism, {k: speeds[k][1] or 0.0 for k in its.commanded})
-    last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
-    run = simulate(
-        parameters,
-        inputs,
-        initial=initial,
-        stop_time=float(last[-1]),
-        samples=np.concatenate([[0.0], last]),
-        tolerance=1e-12,
-    )
-    if run.status:
-        raise LinearModelError(f"there is no steady motion at {speed:g} {channel.name}: {run.message}")
-    names = [f.coordinate for f in mechanism.freedoms] + [f.rate for f in mechanism.freedoms]
-    before, after = np.split(full_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
-    scale = np.array(mechanism.error_scale(parameters, tuple(after[0].tolist())))[:n]
-    gap = after[:, :n] - before[:, :n]
-    for k in its.free:
-        if way := mechanism.freedoms[k].period:
-            gap[:, k] -= way * np.round(gap[:, k] / way)
-    gap = np.abs(gap).max(axis=0) / scale
-    worst = max(its.free, key=lambda k: gap[k])
-    if gap[worst] > 1e-7:
-        raise LinearModelError(
-            f"the motion at {channel.name} {speed:g} has not settled after {turns} turns: "
-            f"{mechanism.freedoms[worst].coordinate} still differs by {gap[worst] * scale[worst]:.3g} from a turn before"
-        )
-    after[:, crank] -= mechanism.freedoms[crank].period * np.copysign(turns - 1, speed)
-    return after

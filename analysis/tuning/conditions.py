@@ -7,11 +7,11 @@ stability. When the parameters change, the motion is found again from its last p
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
-from itertools import combinations
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,11 @@ from ..periodic import (
     PeriodicOrbit,
     Turn,
     Variations,
+    determinant_derivatives,
     extremum_gradient,
     motion_gradient,
     motion_scales,
+    singular_matrix,
 )
 from .wishes import AMPLITUDE, Limit, Wish
 
@@ -54,30 +56,13 @@ class LostError(LinkworkError):
 
 
 class Expansion(NamedTuple):
-    """Derivatives of y(T) - y(0) and of the monodromy matrix with respect to y at crank angle 0, the level, and the k changes.
+    """Derivatives of a motion with respect to the m = n + 1 + k numbers: y at crank angle 0, the level, and the changes."""
 
-    Attributes
-    ----------
-    gaps : ndarray, shape (n, n + 1 + k)
-        Derivatives of y(T) - y(0).
-    monodromy : ndarray, shape (n, n)
-        The monodromy matrix.
-    monodromies : ndarray, shape (n + 1 + k, n, n)
-        Derivatives of the monodromy matrix.
-    variations : Variations
-        The variational equations from which the derivatives are computed.
-    ways : ndarray, shape (panels, nodes, n, n + 1 + k)
-        Derivatives of y at the nodes of the period's panels.
-    constants : ndarray, shape (c, n + 1 + k)
-        Derivatives of the drive vector and the constants of the equations.
-    """
-
-    gaps: FloatArray
-    monodromy: FloatArray
-    monodromies: FloatArray
-    variations: Variations
-    ways: FloatArray
-    constants: FloatArray
+    variations: Variations  # the variational equations, which have the monodromy matrix
+    gaps: FloatArray  # derivatives of y(T) - y(0), shape (n, m)
+    monodromies: FloatArray  # derivatives of the monodromy matrix, (n, n, m)
+    ways: FloatArray  # derivatives of y at the nodes of the period's panels, (panels, nodes, n, m)
+    constants: FloatArray  # derivatives of the drive vector and the constants of the equations, (c, m)
 
 
 def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
@@ -128,60 +113,27 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
     gaps = np.column_stack([v.monodromy - np.eye(n), v.final_deviation(forcing)])
     ways = np.concatenate([v.fundamental, v.solve_from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
     constants = np.column_stack([np.zeros((len(constants), n)), constants])
-    monodromies = np.empty((n + len(unit), n, n))
-    for column in range(n):
-        by_y, by_constant = v.second_derivatives(v.fundamental[..., column])
-        monodromies[:, :, column] = v.final_deviation(by_y @ ways + by_constant @ constants).T
-    return Expansion(gaps, v.monodromy, monodromies, v, ways, constants)
-
-
-def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return a matrix A such that det(I - A) is zero when Floquet multipliers cross the circle of ``radius``.
-
-    ``kind`` is the kind of crossing. The determinant is positive if all multipliers are inside the circle.
-    """
-    if kind is not Crossing.TORUS:
-        return kind.sign * monodromy / radius
-    # the matrix of minors of order 2, whose eigenvalues are the products of two multipliers
-    pairs = list(combinations(range(len(monodromy)), 2))
-    minors = [
-        [monodromy[a, c] * monodromy[b, d] - monodromy[a, d] * monodromy[b, c] for c, d in pairs] for a, b in pairs
-    ]
-    return np.array(minors) / radius**2
+    return Expansion(v, gaps, v.monodromy_derivatives(ways, constants), ways, constants)
 
 
 def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
-    """Return det(I - A) with the matrix A of `margin_matrix`: positive if all multipliers are inside the circle."""
-    matrix = margin_matrix(monodromy, kind, radius)
-    return float(np.linalg.det(np.eye(len(matrix)) - matrix))
+    """Return a determinant that is zero when multipliers cross the circle of ``radius``, and positive if all are inside it."""
+    return float(np.linalg.det(singular_matrix(monodromy / radius, kind)[0]))
 
 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return the derivatives of `crossing_margin` with respect to y, the level and the changes, by exact complex steps."""
-    step = 1e-30
-    matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
-    return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
+    """Return the derivatives of `crossing_margin` with respect to y, the level and the changes, shape (n + 1 + k,)."""
+    matrix, by = singular_matrix(found.variations.monodromy / radius, kind, found.monodromies / radius)
+    return determinant_derivatives(matrix, by)
 
 
-class Row(Protocol):
-    """An equation that picks a motion from its branch."""
-
-    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
-        """Return the residual of the equation."""
-
-    def slopes(self, found: Expansion) -> FloatArray:
-        """Return the derivatives of the residual with respect to y, the level and the changes, shape (n + 1 + k,)."""
-
-    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
-        """Return the derivatives of the residual with respect to y and the level alone, shape (n + 1,)."""
+# Equations that pick a motion from its branch: ``value`` is the residual, ``slopes`` its derivatives with respect to y, the
+# level and the changes, shape (n + 1 + k,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossPlane:
-    """A plane across the branch, normal . (y, level) = offset.
-
-    The plane fixes the level if all entries of the normal but the last are 0.
-    """
+    """A plane across the branch, normal . (y, level) = offset; it fixes the level if the normal is 0 except at its end."""
 
     normal: FloatArray
     offset: float
@@ -195,10 +147,7 @@ class CrossPlane:
         return float(self.normal[:-1] @ y + self.normal[-1] * level - self.offset)
 
     def slopes(self, found: Expansion) -> FloatArray:
-        return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
-
-    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
-        return self.normal
+        return np.append(self.normal, np.zeros(found.gaps.shape[1] - len(self.normal)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,9 +162,8 @@ class StabilityLoss:
     def slopes(self, found: Expansion) -> FloatArray:
         return margin_slopes(found, self.kind)
 
-    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
-        there = found()
-        return self.slopes(there)[: len(there.monodromy) + 1]
+
+Row = CrossPlane | StabilityLoss
 
 
 class PickedMotion:
@@ -271,15 +219,7 @@ class PickedMotion:
 
 
 class TrackedMotion:
-    """A motion that one equation picks from its branch, found again as the parameters change.
-
-    Parameters
-    ----------
-    wish : Wish
-    row : Row
-    spot : Spot
-        A known motion to start from.
-    """
+    """A motion that the equation ``row`` picks from its branch, found again from a known spot as the parameters change."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.wish, self.row = wish, row
@@ -318,9 +258,11 @@ class TrackedMotion:
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
             top = np.column_stack([here.jacobian, here.slope])
-            below = self.row.motion_slopes(
-                partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n])))
-            )
+            if isinstance(self.row, CrossPlane):
+                below = self.row.normal
+            else:
+                there = expansion(self.wish, begin._replace(x=x, y=z[:n], level=float(z[n])))
+                below = self.row.slopes(there)[: n + 1]
             value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
             try:
                 step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
@@ -369,8 +311,7 @@ def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the value that the limit bounds, over a period, and the crank angles at which it occurs.
 
-    The value is the greatest magnitude of the limited quantity, with one angle; or its amplitude, which is half the difference
-    between its maximum and its minimum, with the angles of both.
+    The value is the greatest magnitude of the limited quantity, with one angle; or its amplitude, with those of both extremes.
     """
     samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
@@ -411,27 +352,25 @@ def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) 
 # Conditions
 
 
-class Condition(Protocol):
+class Condition(ABC):
     """A function of the changes of parameters that must not be negative."""
 
     #: Greatest violation that is accepted.
-    slack: float
+    slack = 1e-9
+    #: Name of the requirement to which the condition belongs.
+    group: str
 
-    @property
-    def group(self) -> str:
-        """Name of the requirement to which the condition belongs."""
-
+    @abstractmethod
     def value(self, x: FloatArray) -> float:
         """Return the value of the condition for changes x of the parameters; raise LostError if the motion is not found."""
 
+    @abstractmethod
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the value with respect to the k changes of parameters, shape (k,)."""
 
 
-class MultipliersInside:
+class MultipliersInside(Condition):
     """Condition that no multiplier has left the circle of ``radius`` by a crossing of ``kind``: `crossing_margin` >= 0."""
-
-    slack = 1e-9
 
     def __init__(self, group: str, place: TrackedMotion, kind: Crossing, radius: float) -> None:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
@@ -444,10 +383,8 @@ class MultipliersInside:
         return found.total_derivatives(margin_slopes(found.expansion, self.kind, self.radius))
 
 
-class StabilityLossBeyond:
+class StabilityLossBeyond(Condition):
     """Condition that the point at which stability is lost lies above a level (side +1) or below this level (side -1)."""
-
-    slack = 1e-9
 
     def __init__(self, group: str, place: TrackedMotion, level: float, side: int) -> None:
         self.group, self.place, self.level, self._share = group, place, level, side / place.wish.size
@@ -459,7 +396,7 @@ class StabilityLossBeyond:
         return self._share * self.place.find(x).slopes[-1]
 
 
-class PeakBeyond:
+class PeakBeyond(Condition):
     """Condition that a resonance, a maximum of the amplitude, lies above a level (side +1) or below this level (side -1)."""
 
     slack = 1e-8
@@ -490,7 +427,7 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
     return found.place, known_spot(wish, x, found.orbit, near.coordinate)
 
 
-class OutputBelow:
+class OutputBelow(Condition):
     """Condition that the maximum of an output, over the range and the crank angle, is below its limit."""
 
     slack = 1e-7

@@ -44,21 +44,11 @@ _REST = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Solution of a nonlinear program.
+    """Solution of a nonlinear program."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (k,)
-        The changes of the parameters in units of their tolerances.
-    objective : float
-        Value of the objective.
-    violations : mapping
-        Greatest violation among the conditions of each requirement, by the name of the requirement.
-    """
-
-    x: FloatArray
+    x: FloatArray  # changes of the parameters in units of their tolerances, shape (k,)
     objective: float
-    violations: dict[str, float]
+    violations: dict[str, float]  # greatest violation among the conditions of each requirement, by its name
 
     @property
     def met(self) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..display import NotebookResult, format_count
 from ..mechanisms import Parameters
+from ..periodic import Crossing
 from ..run import parameter_tables
 from ..units import display_text
 from .conditions import FloatArray
@@ -77,7 +78,8 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
         peaks = [(spot.level, spot.level, f"at {wish.say(spot.level)}") for spot in found.peaks]
         result[RESONANCE] = _interval_reading(wish, peaks, wish.range_with_margin)
     if wish.no_jump:
-        jumps = [(region.low, region.high, f"between {_ends_text(wish, region)}") for region in found.folds]
+        folds = (region for region in found.regions if region.kind is Crossing.FOLD)
+        jumps = [(region.low, region.high, f"between {_ends_text(wish, region)}") for region in folds]
         text = _interval_reading(wish, jumps, wish.span)
         if not jumps and several:
             text = Reading(

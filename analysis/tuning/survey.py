@@ -29,9 +29,9 @@ from ..periodic import (
     find_beginning,
     follow_both,
     frequency_response,
+    has_motion,
     largest_multipliers,
     motion_scales,
-    passes,
     search_orbits,
     speed_names,
 )
@@ -69,28 +69,15 @@ SOUGHT, _CHARTED = 5, 201
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
-    """A part of a branch on which stability is lost by one kind of crossing.
-
-    Attributes
-    ----------
-    kind : Crossing
-    low, high : float
-        Least and greatest level of the region, as far as the branch was followed.
-    first, last : SpecialPoint or None
-        Special points at the ends of the region; None at an end that was not reached.
-    worst : Spot
-        Motion with the least value of the test function.
-    across : CrossPlane
-        Equation that picks the motion ``worst`` from the branch.
-    """
+    """A part of a branch on which stability is lost by one kind of crossing, as far as the branch was followed."""
 
     kind: Crossing
-    low: float
+    low: float  # least and greatest level of the region
     high: float
-    first: SpecialPoint | None
+    first: SpecialPoint | None  # special points at the ends of the region; None at an end that was not reached
     last: SpecialPoint | None
-    worst: Spot
-    across: CrossPlane
+    worst: Spot  # motion with the least value of the test function
+    across: CrossPlane  # equation that picks this motion from the branch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,27 +134,11 @@ class Survey:
     largest: tuple[float, float]
     unstable: tuple[tuple[float, float], ...]
 
-    @property
-    def folds(self) -> tuple[Region, ...]:
-        """Regions between folds, where the response jumps."""
-        return tuple(region for region in self.regions if region.kind is Crossing.FOLD)
-
 
 def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Survey:
-    """Follow the response with changes x of the parameters and survey the range.
+    """Follow the response, and the branches of the motions ``more``, with changes x of the parameters, and survey the range.
 
-    Parameters
-    ----------
-    wish : Wish
-    x : ndarray, shape (k,)
-        Changes of the parameters in units of their tolerances.
-    more : sequence of PeriodicOrbit
-        Motions on other branches, which are also followed.
-
-    Raises
-    ------
-    OrbitError
-        If there is no periodic motion from which to start.
+    Raises OrbitError if there is no periodic motion from which to start.
     """
     parameters, drive = wish.operation(x, wish.span[0])
     low, high = _ends(wish, BESIDE)
@@ -250,14 +221,11 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
     ) if high < 0.0 else high + wide
 
 
-def reaches(wish: Wish, low: float, high: float) -> bool:
-    """Return whether the interval of levels from ``low`` to ``high`` overlaps the inside of the range."""
-    return _overlap(wish, low, high, wish.span)
-
-
-def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> bool:
+def reaches(wish: Wish, low: float, high: float, span: tuple[float, float] | None = None) -> bool:
+    """Return whether the interval of levels from ``low`` to ``high`` overlaps the inside of the range, or of ``span``."""
+    first, last = span or wish.span
     slack = AT_THE_END * wish.size
-    return bool(high > span[0] + slack and low < span[1] - slack)
+    return bool(high > first + slack and low < last - slack)
 
 
 def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
@@ -271,16 +239,12 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
         )
     except ContinuationError:
         return response
-    branches = (*response.branches, branch)
-    return replace(response, branches=branches)
+    return replace(response, branches=(*response.branches, branch))
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
-    """Return whether a motion is on a branch of the response, at whichever turn of its period the motion is taken to begin."""
-    level, width = wish.level(orbit), response.high - response.low
-    starts = orbit.passages()
-    own = [branch for branch in response.branches if branch.turns == orbit.turns]
-    return any(passes(branch, level, start, width) for branch in own for start in starts)
+    """Return whether a motion is on a branch of the response."""
+    return has_motion(response.branches, orbit, wish.level(orbit), response.high - response.low)
 
 
 # Lost stability
@@ -411,7 +375,7 @@ def _test_minima(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[TestMini
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
     """Yield the resonances in the range and within the margin beside the range."""
     for top in response.maxima():
-        if _overlap(wish, top.parameter, top.parameter, wish.range_with_margin):
+        if reaches(wish, top.parameter, top.parameter, wish.range_with_margin):
             yield known_spot(wish, x, top.orbit, top.coordinate)
 
 

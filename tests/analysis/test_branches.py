@@ -25,7 +25,6 @@ from analysis.periodic import (
 from analysis.periodic.response.branch import _turn_columns
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 SPEED = SETS["table-3.1"].crank_speed
@@ -178,19 +177,6 @@ def test_the_motor_cannot_pass_the_resonance_where_the_torque_folds() -> None:
     assert fold.parameter == pytest.approx(held, rel=0.05)
 
 
-def test_a_function_can_vary_what_it_likes() -> None:
-    def both(value: float) -> tuple[FiveBarParameters, Drive]:
-        return replace(TABLE_3_1, slider_stiffness=value, slider_damping=0.03 * value), Drive(speed=SPEED)
-
-    parameters, drive = both(1000.0)
-    family = Family(parameters=parameters, drive=drive, vary=both, name="spring and damper")
-    branch = follow(family, find_orbit(parameters, speed=SPEED), 1000.0, low=900.0, high=1100.0)
-    assert branch.reached
-    assert "spring and damper" in branch.columns()
-    end = find_orbit(both(1100.0)[0], speed=SPEED)
-    assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
-
-
 @pytest.mark.slow
 def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
@@ -206,18 +192,6 @@ def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     end = find_orbit(replace(TABLE_3_1, slider_friction_coefficient=0.2), speed=SPEED)
     assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
     assert end.amplitude < 0.7 * orbit.amplitude
-
-
-@pytest.mark.parametrize("name", ["slider.damping", "slider.coulomb_friction", "slider.guide_angle", "crank.length"])
-def test_any_parameter_can_vary(name: str) -> None:
-    orbit = find_orbit(replace(TABLE_3_1, slider_coulomb_friction=0.2), speed=SPEED)
-    family = Family(parameters=orbit.parameters, drive=orbit.drive, vary=name)
-    value = {"slider.damping": 30.0, "slider.coulomb_friction": 0.2, "slider.guide_angle": 0.0, "crank.length": 0.05}[
-        name
-    ]
-    branch = follow(family, orbit, value, low=value - 0.01, high=value + 0.02)
-    assert branch.reached
-    assert len(branch) < 80
 
 
 def test_a_branch_that_nears_the_limit_of_assembly_says_so() -> None:

@@ -10,8 +10,7 @@ import pytest
 from analysis import find_orbit
 from analysis.linkages import load_linkage
 from analysis.numerics.vectors import LANES
-from analysis.periodic import Drive, OrbitEquations, OrbitError, newton_orbit
-from analysis.periodic.chart.grid import largest_multipliers
+from analysis.periodic import Drive, OrbitError, newton_orbit
 from analysis.periodic.motion import collocation
 from analysis.periodic.motion.discretisation import Discretisation, can_collocate
 from analysis.periodic.motion.variables import Family
@@ -81,28 +80,3 @@ def test_friction_and_torques_are_left_to_the_integrator() -> None:
     assert can_collocate([drive], [SMOOTH])
     assert not can_collocate([drive], [SMOOTH, rough])
     assert not can_collocate([drive, Drive(torque=1.0)], [SMOOTH])
-
-
-def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:
-    """Through a resonance, with the multipliers of shooting."""
-    speeds = np.linspace(25.0, 45.0, 41)
-    drives = [Drive(speed=float(speed)) for speed in speeds]
-    values, starts, status = largest_multipliers([SMOOTH] * len(drives), drives)
-    assert (status == 0).all()
-    for k in range(0, 41, 5):
-        alone = newton_orbit(SMOOTH, drives[k], start=starts[k])
-        assert values[k] == pytest.approx(alone.largest, abs=1e-8)
-        assert starts[k] == pytest.approx(alone.start, abs=1e-9)
-
-
-def test_a_point_of_a_branch_computes_the_numbers_of_its_drive_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
-    start = newton_orbit(SMOOTH, family.drive).start
-    equations = OrbitEquations(family, 1, 29.0, 31.0)
-    calls, vector = [], Drive.vector
-    monkeypatch.setattr(Drive, "vector", lambda drive, mechanism: calls.append(drive) or vector(drive, mechanism))
-    orbit = equations(start, 30.0).data
-    assert orbit.residual < 1e-9
-    assert (orbit.scale > 0.0).all()
-    assert orbit.turn().amplitude == pytest.approx(orbit.amplitude)
-    assert len(calls) == 1

@@ -291,12 +291,6 @@ def test_verdict_is_no_boolean() -> None:
         assert not verdict([0.5])
 
 
-def test_undamped_equation_is_marginal_outside_its_regions() -> None:
-    outside, inside = (without_spring(slider(1.0)).stiffened(x) for x in (0.26, 0.2675))
-    assert verdict(multipliers(monodromy(outside))).stability is Stability.MARGINAL
-    assert verdict(multipliers(monodromy(inside))).stability is Stability.UNSTABLE
-
-
 def test_bad_arguments_are_refused() -> None:
     with pytest.raises(InputError, match="not finite"):
         multipliers([[np.nan, 0.0], [0.0, 1.0]])

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
-from analysis import Harmonics, InductionMotor, Inputs, figures, ramp, simulate
+from analysis import InductionMotor, Inputs, figures, ramp, simulate
 from analysis.linear import (
     LEAST_SAMPLES,
     EquilibriumError,
@@ -26,14 +26,13 @@ from analysis.linear import (
     linear_outputs,
     linearise,
     linearise_orbit,
-    settled_motion,
 )
 from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics.tracing import rebind_functions
 from analysis.periodic import find_orbit
 from linkwork import friction
-from linkwork.errors import AssemblyError, InputError, ParameterError, UnknownNameError
+from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests.strategies import rough, seeded
@@ -335,72 +334,21 @@ def test_small_oscillations_have_the_frequencies_and_shapes_of_the_model(mode: i
     assert errors[1] < 0.15 * errors[0]
 
 
-@pytest.mark.parametrize(
-    ("drive", "channel"),
-    [
-        ("free", "slider.force"),
-        ("free", "load.fx"),
-        ("free", "drive.torque"),
-        ("held", "slider.force"),
-        ("held", "load.fx"),
-    ],
-)
-def test_step_responses_are_the_plants_to_first_order(drive: str, channel: str) -> None:
-    parameters = replace(TABLE_3_1, coupler_point_distance=0.1, coupler_point_angle=0.4)
-    rest = find_equilibrium(parameters, held={"crank.angle": 0.5} if drive == "held" else {})
-    names = ("slider.position", "coupler.angle", "pin.C.fx", "slider.guide_force")
-    model = linearise(parameters, rest.state, rest.inputs)
-    system = model.to_state_space(names, (channel,))
-    times = np.linspace(0.0, 0.3, 61)
-    response = control.step_response(system, times, squeeze=False).outputs[:, 0, :]
-    key = {"slider.force": "force", "load.fx": "load_x", "drive.torque": "torque"}[channel]
-    at_rest = np.array([model.outputs[LINEAR_OUTPUTS.index(name)] for name in names])
-    errors = []
-    for size in (0.1, 0.01):
-        inputs = rest.inputs.replace(**{key: size})
-        run = simulate(parameters, inputs, initial=rest.initial, stop_time=0.3, step=5e-3, tolerance=1e-13)
-        deviation = np.array([run[name] for name in names]) - at_rest[:, None]
-        errors.append(np.abs(deviation - size * response).max(axis=1) / np.abs(response).max(axis=1))
-    # what a linear model leaves out goes with the square of the amplitude
-    assert np.all(errors[1] < 0.02 * errors[0] + 1e-9)
-    assert np.all(errors[1] < 0.1 * 0.01)
-
-
-def test_crank_motion_acts_on_the_slider_by_its_three_inputs() -> None:
-    """A crank that is swung about where it was held: x'' by acceleration, speed and angle together."""
-    rest = find_equilibrium(TABLE_3_1, held={"crank.angle": 0.5})
-    system = linearise(TABLE_3_1, rest.state, rest.inputs).to_state_space(
-        inputs=("drive.acceleration", "drive.speed", "crank.angle")
-    )
-    times = np.linspace(0.0, 0.4, 401)
-    w = 40.0
-    swing = np.array([-w * w * np.sin(w * times), w * np.cos(w * times) - w, np.sin(w * times) - w * times])
-    response = control.forced_response(system, times, swing).outputs
-    errors = []
-    for size in (1e-3, 1e-4):
-        speed = (Harmonics(mean=-w * size, amplitudes=[w * size], frequencies=[w], phases=[0.0]),)
-        run = simulate(TABLE_3_1, Inputs(speed=speed), initial=rest.initial, stop_time=0.4, step=1e-3, tolerance=1e-13)
-        errors.append(np.abs(run["slider.position"] - rest["slider.position"] - size * response).max() / size)
-    # python-control takes inputs along straight lines between the samples
-    assert errors[0] < 0.05 * np.abs(response).max()
-    assert errors[1] < 0.15 * errors[0] + 2e-4 * np.abs(response).max()
-
-
 # periodic motions
 
 
 @pytest.fixture(scope="module")
 def turning():
-    return linearise_orbit(TABLE_3_1, settled_motion(TABLE_3_1, TURNING), TURNING)
+    return linearise_orbit(TABLE_3_1, find_orbit(TABLE_3_1, speed=SPEED))
 
 
 def test_monodromy_is_that_of_the_variational_equations(turning) -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     assert turning.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
-    along = linearise_orbit(TABLE_3_1, orbit)
-    assert along.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
-    assert along.period == pytest.approx(turning.period, rel=1e-12)
-    assert along.states[:, :4] == pytest.approx(turning.states[:, :4], abs=1e-7)
+    # as is that of states given at equal times
+    again = linearise_orbit(TABLE_3_1, turning.states, TURNING)
+    assert again.monodromy() == pytest.approx(turning.monodromy(), rel=1e-12)
+    assert again.period == pytest.approx(turning.period, rel=1e-12)
 
 
 def test_multipliers_of_a_motor_drive() -> None:
@@ -490,15 +438,7 @@ def test_bad_motions_are_reported(turning) -> None:
     # dry friction passes between the samples, or is hit by one of them
     dry = replace(TABLE_3_1, slider_coulomb_friction=0.5)
     with pytest.raises(InputError, match=r"128 samples do not resolve .* leave out dry friction"):
-        linearise_orbit(dry, settled_motion(dry, TURNING, turns=20), TURNING)
-    with pytest.raises(InputError, match="speed is 0"):
-        settled_motion(TABLE_3_1, Inputs(speed=0.0))
-    with pytest.raises(InputError, match="constant"):
-        settled_motion(TABLE_3_1, Inputs(torque=1.0))
-    with pytest.raises(LinearModelError, match=r"has not settled after 3 turns: slider\.position"):
-        settled_motion(SETS["rig-2-spring-c"].parameters, Inputs(speed=40.0), turns=3)
-    with pytest.raises(ParameterError, match="turns is 1: it must be at least 2"):
-        settled_motion(TABLE_3_1, Inputs(speed=40.0), turns=1)
+        linearise_orbit(dry, find_orbit(dry, speed=SPEED))
     with pytest.raises(InputError, match="must be numbers in SI"):
         linearise(TABLE_3_1, ["30 deg", 0.0, 0.0, 0.0])
     with pytest.raises(InputError, match="2 finite numbers"):

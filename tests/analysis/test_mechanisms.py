@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from analysis import Inputs, compare, cosimulate, simulate
+from analysis import Inputs, compare, cosimulate, find_orbit, simulate
 from analysis.export import build
 from analysis.files import read_record
 from analysis.linear import (
@@ -31,7 +31,6 @@ from analysis.linear import (
     linearise,
     linearise_orbit,
     predict_loop,
-    settled_motion,
 )
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismError, check, register
 from analysis.run import CASES, InductionMotor, expressions, simulate_many, standard_cases
@@ -235,7 +234,7 @@ def test_torque_balances_the_pendulum_upside_down() -> None:
 def shaken() -> PeriodicModel:
     """The linear models of the cart about the motion in which the rotor shakes it."""
     parameters = demo(ROTOR).parameters
-    return linearise_orbit(parameters, settled_motion(parameters, TURNING), TURNING)
+    return linearise_orbit(parameters, find_orbit(parameters, TURNING))
 
 
 def test_cart_is_held_in_process_and_through_the_fmu(shaken: PeriodicModel, fmus: dict[str, Path]) -> None:

@@ -61,28 +61,6 @@ rotor = { joint = "R", speed = "120 rpm" }
 lift = "Y"
 swing = { joint = "P", start = "180 deg" }
 """
-#: A parallelogram of two leaves carries a trough; at the leaf angle 0 its points are in one line and cannot be joined.
-TROUGH = """
-[linkage]
-name = "trough"
-ground = { A = [-0.6, -0.02], E = [0, -0.2], G = [0.8, -0.2] }
-[linkage.bodies]
-crank = { bar = ["A", "B"], length = 0.012, mass = 3, inertia = 0.02 }
-rod = { points = { B = [0, 0] }, mass = 0 }
-head = { points = { C = [0, 0] }, mass = 0.8 }
-left = { bar = ["E", "H"], length = 0.25, mass = 1, cog = [0.125, 0], inertia = 0.006 }
-right = { bar = ["G", "K"], length = 0.25, mass = 1, cog = [0.125, 0], inertia = 0.006 }
-trough = { points = { H = [0, 0], K = [0.8, 0], C = [0.05, -0.06] }, mass = 40 }
-[linkage.slides]
-S = { body = "head", on = "rod", through = "B" }
-[linkage.springs]
-leaf = { at = "E", stiffness = 3000, free = "115 deg", damping = 2 }
-[linkage.freedoms]
-crank = { joint = "A", speed = "400 rpm" }
-leaf = { joint = "E", start = "115 deg" }
-[linkage.assembly]
-K = -1
-"""
 #: A crank alone.
 CRANK = """
 [linkage]
@@ -178,12 +156,6 @@ def test_a_crank_alone_has_no_natural_frequency_and_no_basins(tmp_path: Path) ->
             InputError, match="one-crank has no free coordinate other than the crank's angle, so that starts"
         ):
             basins(case.parameters, Drive(torque=0.1), start=(5.0,), coordinate=name)
-
-
-def test_the_spring_alone_where_it_is_free(tmp_path: Path) -> None:
-    case = load_case(write(tmp_path, TROUGH))
-    inertia = 2.0 * (0.006 + 0.125**2) + (40.0 + 0.8) * 0.25**2
-    assert natural_frequency(case.parameters) == pytest.approx(sqrt(3000.0 / inertia), rel=1e-12)
 
 
 def test_the_crank_of_a_five_bar_is_held_whatever_drives_it() -> None:

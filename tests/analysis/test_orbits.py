@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from analysis import InductionMotor, Inputs, ramp, simulate
 from analysis.periodic import (
-    Crossing,
     Drive,
     OrbitAssemblyError,
     OrbitError,
@@ -20,7 +19,6 @@ from analysis.periodic import (
     newton_orbit,
 )
 from analysis.periodic.motion.kernels import eliminate
-from analysis.periodic.motion.orbit import _time
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar import dynamics
@@ -156,29 +154,6 @@ def test_turn_is_that_of_a_run() -> None:
     assert run["crank.angle"][-1] == pytest.approx(2.0 * pi, abs=1e-8)
 
 
-def test_small_deviations_grow_by_the_multiplier() -> None:
-    parameters, drive, start = ORBITS["unstable"]
-    orbit = newton_orbit(parameters, drive, start=start)
-    verdict = orbit.verdict()
-    assert verdict.stability is Stability.UNSTABLE
-    assert verdict.crossing is Crossing.FOLD
-    _, vectors = np.linalg.eig(orbit.monodromy)
-    aside = vectors[:, np.argmax(np.abs(np.linalg.eigvals(orbit.monodromy)))].real
-    aside = 1e-7 * aside / abs(aside[0])
-    run = simulate(
-        parameters,
-        Inputs(speed=SPEED),
-        initial=InitialState(slider_position=orbit.start[0] + aside[0], slider_velocity=orbit.start[1] + aside[1]),
-        stop_time=10 * 2.0 * pi / SPEED,
-        step=2.0 * pi / SPEED,
-        tolerance=1e-12,
-    )
-    deviation = run["slider.position"] - orbit.start[0]
-    assert np.exp(np.polyfit(np.arange(3, 9), np.log(np.abs(deviation[3:9])), 1)[0]) == pytest.approx(
-        orbit.largest, rel=1e-3
-    )
-
-
 def test_two_turns_have_the_square_of_the_monodromy_matrix() -> None:
     once, twice = (find_orbit(TABLE_3_1, speed=SPEED, turns=n) for n in (1, 2))
     assert twice.start == pytest.approx(once.start, abs=1e-10)
@@ -199,17 +174,6 @@ def test_amplitude_and_harmonics() -> None:
         turn.harmonic("slider.position", 0.5)
     with pytest.raises(InputError, match=r"no output 'energy\.supplied'"):
         turn["energy.supplied"]
-
-
-def test_of_two_motions_the_guess_decides() -> None:
-    speed = 1000.0 * RAD_S_PER_RPM
-    lower = find_orbit(RIG_1_B, speed=speed)
-    upper = find_orbit(RIG_1_B, speed=1050.0 * RAD_S_PER_RPM)
-    for rpm in range(1045, 995, -5):
-        upper = find_orbit(RIG_1_B, speed=rpm * RAD_S_PER_RPM, start=upper.start)
-    assert lower.amplitude < 0.03
-    assert upper.amplitude > 0.1
-    assert lower.verdict().stability is upper.verdict().stability is Stability.STABLE
 
 
 def test_newton_converges_quadratically_from_afar() -> None:
@@ -286,16 +250,6 @@ def test_row_of_orbits_is_the_orbits_one_by_one() -> None:
     assert np.isnan(values[~good]).all()
     with pytest.raises(InputError, match="kind of drive"):
         largest_multipliers(rows[:2], [Drive(speed=SPEED), Drive(motor=MOTOR)])
-
-
-@pytest.mark.parametrize(("turns", "n"), [(1, 65), (2, 65), (2, 64), (4, 64)])
-def test_time_of_a_motion_of_several_turns(turns: int, n: int) -> None:
-    """By a speed whose inverse has a mean and one wave over the period."""
-    way = 2.0 * pi * turns
-    angle = np.arange(n) * (way / n)
-    time, period = _time(1.0 / (0.1 + 0.03 * np.cos(angle / turns)), way)
-    np.testing.assert_allclose(time, 0.1 * angle + 0.03 * turns * np.sin(angle / turns), atol=1e-14)
-    assert period == pytest.approx(0.1 * way, rel=1e-14)
 
 
 def test_a_system_without_a_solution_is_said_to_have_none() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis import Harmonics, Inputs, simulate, steps
+from analysis import Harmonics, Inputs, find_orbit, simulate, steps
 from analysis import linear as lin
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, ParameterError, UnknownNameError
@@ -255,27 +255,6 @@ def test_the_loop_is_the_predicted_one_to_first_order(which, request) -> None:
     assert errors[0] < 0.1 * 4e-3
 
 
-def test_sampling_tends_to_the_continuous_law(held) -> None:
-    design = lin.design_lqr(held, WEIGHTS)
-    target = float(held.state[1]) + 3e-3
-    inputs = Inputs(speed=0.0, force=design.continuous_law(target))
-    exact = simulate(TABLE_3_1, inputs, initial=start(held), stop_time=0.2, step=1e-2, tolerance=1e-12)
-    errors = []
-    for every in (10, 20, 40):
-        h = 1e-2 / every
-        loop = lin.control_loop(
-            TABLE_3_1, lin.SampledController(design, h), target, HELD, initial=start(held), stop_time=0.2
-        )
-        errors.append(np.abs(loop.position[::every] - exact["slider.position"]).max())
-    assert errors[0] < 2e-4
-    assert errors[1] / errors[0] == pytest.approx(0.5, abs=0.05)
-    assert errors[2] / errors[1] == pytest.approx(0.5, abs=0.05)
-    # the reference is held on the linear model, whose stiffness is nearly the plant's
-    assert exact["slider.position"][-1] == pytest.approx(target, abs=1e-4)
-    with pytest.raises(lin.DesignError, match="integral action"):
-        lin.design_pid(held, bandwidth=50.0).continuous_law(target)
-
-
 def test_the_integral_takes_a_load_away(held) -> None:
     # at C: the crank pin, where P is by default, does not move
     tip = replace(TABLE_3_1, coupler_point_distance=0.15)
@@ -342,7 +321,7 @@ def resonant():
     speed = 585.0 * RAD_S_PER_RPM
     p = SETS["rig-2-spring-c"].parameters
     turning = Inputs(speed=speed)
-    return p, turning, lin.linearise_orbit(p, lin.settled_motion(p, turning), turning)
+    return p, turning, lin.linearise_orbit(p, find_orbit(p, turning))
 
 
 def test_the_slider_is_kept_still_at_resonance(resonant) -> None:
@@ -369,7 +348,7 @@ def test_without_control_the_periodic_model_repeats_the_motion(resonant) -> None
     run = lin.predict_loop(models, idle, 0.0, stop_time=2.0 * models.period)
     assert np.abs(run.force).max() == 0.0
     assert run.position[:100] == pytest.approx(run.position[100:200], abs=1e-12)
-    motion = lin.settled_motion(p, turning, samples=100)
+    motion = lin.linearise_orbit(p, find_orbit(p, turning), samples=100).states
     assert run.position[:100] == pytest.approx(motion[:, 1], abs=1e-8)
 
 

@@ -274,12 +274,14 @@ class TestGeneralMechanism:
         )
         assert float(found.torque) == pytest.approx(m.torque, rel=1e-10)
 
-    def test_mean_effective_mass(self) -> None:
-        p = SETS["rig-1-spring-a"].parameters
+    @pytest.mark.parametrize("free", [0.0, 0.01])
+    def test_mean_effective_mass(self, free: float) -> None:
+        """With the slider where its spring is free."""
+        p = replace(SETS["rig-1-spring-a"].parameters, slider_spring_free_position=free)
         k = p.constants()
         masses = []
         for th2 in np.linspace(0.0, 2.0 * pi, 200, endpoint=False).tolist():
-            g = kinematics.position(th2, 0.0, k)
+            g = kinematics.position(th2, free, k)
             masses.append(dynamics.inertia(g, kinematics.coefficients(g, k), k).m22)
         assert mean_effective_mass(p) == pytest.approx(np.mean(masses), rel=1e-13)
 

@@ -31,7 +31,7 @@ from analysis.periodic import (
 )
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.motion import kernels as orbit_kernels
-from analysis.youssef import PeriodicEquation, hill_regions, linear_equation, linear_test, linear_verdict, monodromy
+from analysis.youssef import PeriodicEquation, hill_regions, linear_test, linear_verdict, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
 from tests.published import (
@@ -304,14 +304,6 @@ def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
     assert 2.4 < wide / narrow < 2.8
 
 
-def test_linear_region_is_hills() -> None:
-    equation = linear_equation(chapter_4(1.0), Drive(speed=crank_speed(0.26)))
-    hill = hill_regions(equation, 1)[1]
-    test = linear_test(first_region_plane(), -1)
-    roots = scan(lambda x: test(x, 1.0), 0.25, 0.29, samples=60).roots
-    assert roots == pytest.approx([0.26 + hill.low, 0.26 + hill.high], abs=1e-11)
-
-
 def test_chart_of_the_true_orbit_round_a_tip() -> None:
     """With damping the boundary turns back at an I4; there that damping removes the region."""
     found = chart(orbit_test(first_region_plane(0.1), -1), Box(x=(0.25, 0.29), y=(0.25, 2.0)), lines=(0, 2))
@@ -478,11 +470,6 @@ def test_bad_grids_are_refused(tmp_path: Path) -> None:
         grid(first_region_plane(), XS, [-1.0], folder=tmp_path)
 
 
-def test_grid_is_kept_beside_the_compiled_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
-    assert grids.grid_folder() == tmp_path / "grids"
-
-
 # Long runs
 
 
@@ -509,16 +496,6 @@ def test_long_run_decays_at_the_multiplier_of_a_complex_pair() -> None:
     assert run.outcome is Outcome.DECAYS
     assert run.agrees
     assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-5)
-
-
-def test_unstable_orbit_of_table_3_1() -> None:
-    """On the branch that turns back at about 232 N/m a multiplier is above +1."""
-    parameters, drive = replace(TABLE_3_1, slider_stiffness=235.0), Drive(speed=14.0 * pi)
-    run = confirm(parameters, drive, turns=40, start=(-0.0368, -0.5125), disturbance=1e-7)
-    assert run.verdict.stability is Stability.UNSTABLE
-    assert run.verdict.largest_multiplier.real > 1.1
-    assert run.outcome is Outcome.GROWS
-    assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=2e-3)
 
 
 def test_a_deviation_that_is_lost_within_a_turn_has_decayed() -> None:

@@ -11,7 +11,7 @@ from numba import float64, int64, types
 from analysis import InductionMotor
 from analysis.numerics.codegen import MATRIX, VECTOR, kernel
 from analysis.numerics.vectors import LANES, absolute, greater, load, multiply_add, store
-from analysis.periodic import Drive, coexistence, plane
+from analysis.periodic import Drive
 from analysis.periodic.motion import kernels
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
@@ -106,20 +106,6 @@ def test_known_motions_are_divided_out_by_their_distances() -> None:
     slope = factor * (-2.0 / (square * (1.0 + square)) * ((start - known) / scale**2).T).sum(axis=1)
     jacobian = factor * (monodromy - np.eye(2)) + np.outer(end - start, slope)
     assert correction == pytest.approx(np.linalg.solve(jacobian, factor * (start - end)), rel=1e-9)
-
-
-def test_the_motions_of_a_grid_close_and_differ() -> None:
-    """Each closes after a turn, and no two are the same."""
-    rig = SETS["rig-1-spring-b"].parameters
-    speeds = np.linspace(95.0, 110.0, 7)
-    found = coexistence(plane(rig, Drive(speed=100.0), "drive.speed", "slider.damping"), speeds, [8.0, 14.0])
-    assert found.count.max() > 1
-    for column, speed in enumerate(speeds.tolist()):
-        point = operating_point(replace(rig, slider_damping=8.0), Drive(speed=speed))
-        for start in found.starts[0, column, : found.count[0, column]]:
-            assert point.period(start, 1).shift == pytest.approx(0.0, abs=1e-9)
-        own = found.starts[0, column, : found.count[0, column], 0]
-        assert np.diff(np.sort(own)).min(initial=1.0) > 1e-6
 
 
 @kernel(types.void(VECTOR, VECTOR, VECTOR), purpose="a test")

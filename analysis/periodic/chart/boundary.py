@@ -163,35 +163,16 @@ def line_branches(
     start: ArrayLike | None = None,
     watch: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Branch], Coexistence, list[str]]:
-    """Follow all branches of motions along the line y = const of a plane, in both directions.
+    """Follow all branches of motions along the line y = const of a plane, over a range of x, in both directions.
 
     All motions are sought at evenly spaced points of the line; a branch is followed from each motion through which no branch
     passes yet. A motion is followed as long as deviations grow less than a thousandfold per turn. Where they grow faster, next
     to the limit of assembly, folds and period doublings come in pairs; the ranges of stability between them are too narrow for
     any machine.
 
-    Parameters
-    ----------
-    operation : callable
-        See `plane`.
-    x : (float, float)
-        Range of the parameter x along the line.
-    y : float
-        Value of the parameter y on the line.
-    name, unit : str
-        Name and unit of x.
-    start : array_like, shape (n,), optional
-        See `coexistence`.
-    watch : callable, optional
-        Called with the share of the work that is done, from 0 to 1.
-
-    Returns
-    -------
-    branches : list of Branch
-    found : Coexistence
-        The motions from which the branches were followed.
-    lost : list of str
-        One sentence for each motion that could not be followed.
+    ``name`` and ``unit`` are those of x; ``start`` is that of `coexistence`. ``watch`` is called with the share of the work
+    that is done, from 0 to 1. Return the branches, the motions from which they were followed, and a sentence for each motion
+    that could not be followed.
     """
     xs = np.linspace(*x, POINTS)
     found = coexistence(operation, xs, [y], start=start)
@@ -269,12 +250,12 @@ def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
-def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
+def orbit_test(operation: Plane, multiplier: int) -> Test:
     """Return the test function of the mechanism's periodic orbit over a plane: see `plane_test` and `orbit_monodromy`.
 
     ``multiplier`` is +1 or -1: the test function is zero where a Floquet multiplier of the orbit has this value.
     """
-    return plane_test(orbit_monodromy(operation, start=start), multiplier)
+    return plane_test(orbit_monodromy(operation), multiplier)
 
 
 # Removing damping

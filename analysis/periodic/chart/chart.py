@@ -564,16 +564,9 @@ class _Survey:
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
     """Return values of y of further lines to search: one through each region that no searched line or known boundary meets.
 
-    A region is a connected set of grid points with the same number of stable motions.
-
-    Parameters
-    ----------
-    beside : Coexistence
-        All motions at every point of the grid.
-    lines : sequence of float
-        Values of y of the lines that were searched.
-    boundaries : sequence of ndarray, shape (n, 2)
-        Known boundaries: a region within one cell of a boundary needs no line.
+    A region is a connected set of grid points of ``beside`` with the same number of stable motions. ``lines`` are the values
+    of y of the lines that were searched. A region within one cell of one of the ``boundaries``, of shape (n, 2), needs no
+    line.
     """
     cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
     found: list[float] = []

@@ -26,7 +26,7 @@ from ..motion.orbit import PeriodicOrbit, require_turns, solve_orbit
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
-from .grid import PointRow, RowComputation, grid_points, point_row, row_code, row_name
+from .grid import PointRow, compute_rows, grid_points, point_row, row_code, row_name
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions, Points
 
 FloatArray = NDArray[np.float64]
@@ -167,11 +167,17 @@ def coexistence(
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
-    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_all, _TOGETHER).rows(
+    data, computed = compute_rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
+        kernels.solve_all,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what=what,
+        together=_TOGETHER,
     )
     whole = rows[0].flow.index_of_all
     _seek_from_neighbours(operation, xs, ys, data, whole)
@@ -315,10 +321,10 @@ class Basins(NotebookResult):
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the basins as a CSV table with one row per initial state."""
-        (name, unit), (rate, rate_unit) = self._components()
+        position, rate = self.labels
         columns = {
-            f"{name} [{unit}]": np.tile(self.position, len(self.rate)),
-            f"{rate} [{rate_unit}]": np.repeat(self.rate, len(self.position)),
+            position: np.tile(self.position, len(self.rate)),
+            rate: np.repeat(self.rate, len(self.position)),
             "motion (1 and on; 0: limit of assembly; -1: none)": self.ends.ravel() + 1.0,
         }
         return write_csv(path, columns)
@@ -427,11 +433,16 @@ def basins(
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
     row = point_row([point], known[0])
     near = min(_NEAR, _APART * _least_distance(found.orbits, row.scales[0]))
-    ends, computed = RowComputation(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
+    ends, computed = compute_rows(
         partial(_ends, point, known, near, place, across),
         up.tolist(),
         [row_name(row, known, (*_FOLLOWED, GAP), code, near, place, *across, value) for value in up.tolist()],
         (points,),
+        kernels.settle_starts,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what="starts",
     )
     met = ends.astype(np.int64)
     met[met >= 0] = owner[met[met >= 0]]

@@ -203,11 +203,16 @@ def grid(
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_row, multipliers)
-    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_row).rows(
+    data, computed = compute_rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (*_USED, GAP), code, tolerance) for row in rows],
         (len(xs), guesses.shape[1] + 2),
+        kernels.solve_row,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what=what,
     )
     status = data[..., -1].astype(np.int64)
     return Grid(
@@ -230,23 +235,13 @@ def _compute_row(guesses: FloatArray, tolerance: float, rows: Sequence[PointRow]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointRow:
-    """The m operating points of a row of a chart, which share a flow.
+    """The m operating points of a row of a chart, which share a flow."""
 
-    Attributes
-    ----------
-    first : OperatingPoint
-        The first point.
-    constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
-        Constants of the equations, drive vectors (`Drive.vector`), and magnitudes of y, of each point.
-    smooth : bool
-        Whether collocation can be used at all points.
-    """
-
-    first: OperatingPoint
-    constants: FloatArray
-    vectors: FloatArray
-    scales: FloatArray
-    smooth: bool
+    first: OperatingPoint  # the first point
+    constants: FloatArray  # constants of the equations of each point, shape (m, constants)
+    vectors: FloatArray  # drive vectors, `Drive.vector`, (m, drive)
+    scales: FloatArray  # magnitudes of y, (m, n)
+    smooth: bool  # whether collocation can be used at all points
 
     @property
     def flow(self) -> Flow:
@@ -361,17 +356,8 @@ def row_code(*functions: Any) -> tuple[str, ...]:
 def row_name(row: PointRow, guesses: FloatArray, functions: Sequence[int], code: Sequence[str], *numbers: float) -> str:
     """Return the name of a row in the cache: a hash of all that the row depends on.
 
-    Parameters
-    ----------
-    row : PointRow
-    guesses : ndarray, shape (k, n)
-        Guesses of y; the first guess also gives the magnitudes of y.
-    functions : sequence of int
-        Indices of the flow's functions that are called.
-    code : sequence of str
-        See `row_code`.
-    *numbers : float
-        Further numbers that the row depends on.
+    ``guesses`` are guesses of y, shape (k, n); ``functions`` the indices of the flow's functions that are called; ``code`` is
+    that of `row_code`; ``numbers`` are further numbers that the row depends on.
     """
     flow = row.flow
     digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=row.switched), *code)).encode())
@@ -380,100 +366,63 @@ def row_name(row: PointRow, guesses: FloatArray, functions: Sequence[int], code:
     return digest.hexdigest()[:32]
 
 
-@dataclass(frozen=True, slots=True)
-class RowComputation:
-    """Settings for computing rows of a grid on several workers and for storing the rows on disk.
+def compute_rows(
+    work: Callable[[Sequence[Item]], FloatArray],
+    items: Sequence[Item],
+    names: Sequence[str],
+    shape: tuple[int, ...],
+    kernel: Any,
+    *,
+    folder: str | Path | None,
+    n_jobs: int | None,
+    progress: bool,
+    what: str,
+    together: int = 1,
+) -> tuple[FloatArray, int]:
+    """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
 
-    Attributes
-    ----------
-    folder : path or None
-        Folder of the cache; `grid_folder` if None.
-    n_jobs : int or None
-        Number of processes: see `grid`.
-    progress : bool
-    what : str
-        Text before the progress bar.
-    kernel : Kernel
-        Kernel that computes the rows; it is compiled once, before the workers start.
-    together : int
-        Greatest number of rows that are computed in one piece of work.
+    ``work`` computes up to ``together`` items; its result has a row of the given ``shape`` for each of them. ``names`` are
+    those of the items in the cache: see `row_name`. ``kernel`` is compiled once, before the workers start. The other arguments
+    and the exceptions are those of `grid`. The result has the shape (items, *shape); with it comes the number of rows that
+    were not in the cache.
     """
-
-    folder: str | Path | None
-    n_jobs: int | None
-    progress: bool
-    what: str
-    kernel: Any
-    together: int = 1
-
-    def rows(
-        self,
-        work: Callable[[Sequence[Item]], FloatArray],
-        items: Sequence[Item],
-        names: Sequence[str],
-        shape: tuple[int, ...],
-    ) -> tuple[FloatArray, int]:
-        """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
-
-        Parameters
-        ----------
-        work : callable
-            Function that computes up to ``together`` items; the result has a row for each of them.
-        names : sequence of str
-            Names of the items in the cache: see `row_name`.
-        shape : tuple of int
-            Shape of each result.
-
-        Returns
-        -------
-        rows : ndarray, shape (items, *shape)
-        computed : int
-            Number of rows that were not in the cache.
-
-        Raises
-        ------
-        InputError
-            If there are no cores.
-        GridInterrupted
-            On Ctrl-C.
-        """
-        check_jobs(self.n_jobs)
-        where = grid_folder() if self.folder is None else Path(self.folder)
-        with suppress(OSError):  # the warning follows when the first row cannot be kept
-            where.mkdir(parents=True, exist_ok=True)
-        paths = [where / f"{name}.row" for name in names]
-        rows: dict[Path, FloatArray] = {}
-        missing: dict[Path, Item] = {}
-        for path, item in zip(paths, items):
-            kept = load_array(path)
-            if kept is not None and kept.shape == shape:
-                rows[path] = kept
-            else:
-                missing[path] = item
-        if missing:
-            _ = self.kernel.compiled
-        unkept = 0
-        with record_interrupts() as interrupted, show_progress(self.progress, float(len(paths)), self.what) as show:
+    check_jobs(n_jobs)
+    where = grid_folder() if folder is None else Path(folder)
+    with suppress(OSError):  # the warning follows when the first row cannot be kept
+        where.mkdir(parents=True, exist_ok=True)
+    paths = [where / f"{name}.row" for name in names]
+    rows: dict[Path, FloatArray] = {}
+    missing: dict[Path, Item] = {}
+    for path, item in zip(paths, items):
+        kept = load_array(path)
+        if kept is not None and kept.shape == shape:
+            rows[path] = kept
+        else:
+            missing[path] = item
+    if missing:
+        _ = kernel.compiled
+    unkept = 0
+    with record_interrupts() as interrupted, show_progress(progress, float(len(paths)), what) as show:
+        show(float(len(rows)))
+        # at least two pieces of work for each worker, so that no worker waits long for the others
+        size = min(together, 1 + len(missing) // (2 * worker_count(n_jobs)))
+        pieces = [list(missing)[n : n + size] for n in range(0, len(missing), size)]
+        tasks = [[missing[path] for path in piece] for piece in pieces]
+        for number, made in run_in_parallel(work, tasks, interrupted, n_jobs=n_jobs):
+            for path, row in zip(pieces[number], made):
+                rows[path] = row
+                try:
+                    save_array(path, row)
+                except OSError as error:
+                    if not unkept:
+                        warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
+                    unkept += 1
             show(float(len(rows)))
-            # at least two pieces of work for each worker, so that no worker waits long for the others
-            size = min(self.together, 1 + len(missing) // (2 * worker_count(self.n_jobs)))
-            pieces = [list(missing)[n : n + size] for n in range(0, len(missing), size)]
-            tasks = [[missing[path] for path in piece] for piece in pieces]
-            for number, made in run_in_parallel(work, tasks, interrupted, n_jobs=self.n_jobs):
-                for path, row in zip(pieces[number], made):
-                    rows[path] = row
-                    try:
-                        save_array(path, row)
-                    except OSError as error:
-                        if not unkept:
-                            warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
-                        unkept += 1
-                show(float(len(rows)))
-                if interrupted:
-                    break
-            if interrupted and len(rows) < len(set(paths)):
-                raise GridInterrupted(len(rows) - unkept, len(paths), where)
-        return np.array([rows[path] for path in paths]), len(missing)
+            if interrupted:
+                break
+        if interrupted and len(rows) < len(set(paths)):
+            raise GridInterrupted(len(rows) - unkept, len(paths), where)
+    return np.array([rows[path] for path in paths]), len(missing)
 
 
 #: Least margin with which a long run distinguishes growth from decay with certainty.

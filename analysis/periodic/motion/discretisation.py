@@ -109,25 +109,14 @@ class Period(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatingPoint:
-    """A mechanism and its drive as arrays for the kernels, computed once and shared by all results of a motion.
-
-    Attributes
-    ----------
-    parameters : parameters of a mechanism
-    drive : Drive
-    mechanism : Mechanism
-    flow : Flow
-        The mechanism with this drive, as a flow.
-    vector, constants : ndarray
-        Drive vector (`Drive.vector`) and constants of the equations.
-    """
+    """A mechanism and its drive as arrays for the kernels, computed once and shared by all results of a motion."""
 
     parameters: Parameters
     drive: Drive
     mechanism: Mechanism
-    flow: Flow
-    vector: FloatArray
-    constants: FloatArray
+    flow: Flow  # the mechanism with this drive, as a flow
+    vector: FloatArray  # drive vector, `Drive.vector`
+    constants: FloatArray  # constants of the equations
 
     def __reduce__(self) -> tuple[object, ...]:
         return _unpickle, (self.mechanism, self.parameters, self.drive)
@@ -147,18 +136,10 @@ class OperatingPoint:
     ) -> Section:
         """Return the `Section` for the kernels: addresses of the flow's functions, constants, drive, scale of y, tolerance.
 
-        Parameters
-        ----------
-        start : ndarray, shape (n,)
-            State that gives the magnitudes of y.
-        *functions : int
-            Indices of the flow's functions that are needed, in addition to GAP.
-        direction : Direction, optional
-            Derivatives of the drive vector and the constants with respect to a parameter lambda; zero if not given.
-        along : float
-            Typical magnitude of lambda, which scales the errors of derivatives with respect to lambda.
-        switched : bool
-            Whether to use the equations with their optional terms, such as friction, even if this mechanism has none.
+        ``start``, shape (n,), gives the magnitudes of y; ``functions`` are the indices of the flow's functions that are needed
+        besides GAP. ``direction`` are the derivatives with respect to a parameter lambda, zero if not given; ``along`` is the
+        typical magnitude of lambda, which scales the errors of these derivatives. If ``switched``, the equations with their
+        optional terms, such as friction, are used even if this mechanism has none.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may switch the optional terms on
@@ -179,19 +160,9 @@ class OperatingPoint:
     def shoot(
         self, angles: FloatArray, starts: FloatArray, direction: Direction | None = None, along: float = 1.0
     ) -> Ends:
-        """Integrate y with its derivatives over the pieces of a period, each from its own start.
+        """Integrate y with its derivatives over the pieces of a period, each from its own start; raise OrbitError on failure.
 
-        Parameters
-        ----------
-        angles, starts
-            As in `Stations`.
-        direction, along
-            See `section`.
-
-        Raises
-        ------
-        OrbitError
-            If the integration over a piece fails.
+        ``angles`` and ``starts`` are those of `Stations`, ``direction`` and ``along`` those of `section`.
         """
         k, n = starts.shape
         rows = np.zeros((k, n * (2 + n)))
@@ -282,21 +253,11 @@ def can_collocate(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> 
 
 
 class Stations(NamedTuple):
-    """The pieces of a period in multiple shooting.
+    """The pieces of a period in multiple shooting."""
 
-    Attributes
-    ----------
-    angles : ndarray, shape (k + 1,)
-        Crank angles (rad) at which the pieces begin, the first 0, and the end of the period.
-    starts : ndarray, shape (k, n)
-        y at the beginnings of the pieces.
-    growth : float
-        Greatest growth factor of a deviation over a piece: see `growth_factors`.
-    """
-
-    angles: FloatArray
-    starts: FloatArray
-    growth: float
+    angles: FloatArray  # crank angles (rad) at which the k pieces begin, the first 0, and the end of the period, shape (k + 1,)
+    starts: FloatArray  # y at the beginnings of the pieces, (k, n)
+    growth: float  # greatest growth factor of a deviation over a piece: see `growth_factors`
 
 
 def growth_factors(matrices: FloatArray, scale: FloatArray) -> FloatArray:
@@ -308,17 +269,9 @@ def growth_factors(matrices: FloatArray, scale: FloatArray) -> FloatArray:
 
 
 def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:
-    """Divide a period into pieces that are shorter where deviations grow faster.
+    """Divide a period into pieces, shorter where deviations grow faster; return their angles and starts: see `Stations`.
 
-    Parameters
-    ----------
-    places : ndarray, shape (PLACES turns, n)
-        y at equal steps of the crank angle.
-
-    Returns
-    -------
-    angles, starts
-        As in `Stations`.
+    ``places``, shape (PLACES turns, n), is y at equal steps of the crank angle.
     """
     count = len(places)
     angles = np.linspace(0.0, point.flow.period * turns, count + 1)
@@ -333,14 +286,8 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 class Discretisation:
     """Method that computes y at the ends of the pieces of a period, for one motion of a family after another.
 
-    Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried.
-
-    Parameters
-    ----------
-    angles : ndarray, shape (k + 1,)
-        As in `Stations`.
-    collocated : bool
-        Whether collocation is tried: see `can_collocate`.
+    Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried, as
+    ``collocated`` tells (`can_collocate`). ``angles`` are those of `Stations`.
     """
 
     def __init__(self, angles: FloatArray, collocated: bool) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
-from linkwork.mechanism import Channel, Freedom, Mechanism, Mode, PublishedSet
+from linkwork.mechanism import Channel, Freedom, Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
 from ...files import unknown_name
@@ -456,11 +456,7 @@ def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None
     mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
     chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
     if mode is not None and chosen != channel.argument:
-        raise InputError(f"{channel.name} does not act: {mode.name} is {_value(mode, chosen)}")
-
-
-def _value(mode: Mode, argument: str) -> str:
-    return mode.values[mode.arguments.index(argument)]
+        raise InputError(f"{channel.name} does not act: {mode.name} is {mode.values[mode.arguments.index(chosen)]}")
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
@@ -573,13 +569,13 @@ def _choose_crank(
     speed = speeds.get(first) or start[first]
     ratios = {}
     for n in mechanism.cyclic_freedoms:
-        if n != first and n in speeds:
-            ratios[n] = (
-                speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
-                if first in speeds
-                else Fraction(0)
-            )
-        elif n != first and speed != 0.0 and (start[n] != 0.0 or not mechanism.freedoms[n].coupled):
+        if n == first:
+            continue
+        if n in speeds and first in speeds:
+            ratios[n] = speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
+        elif n in speeds:
+            ratios[n] = Fraction(0)
+        elif speed != 0.0 and (start[n] != 0.0 or not mechanism.freedoms[n].coupled):
             ratios[n] = start_ratio(start[n], speed)
     return crank, ratios
 

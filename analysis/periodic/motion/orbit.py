@@ -469,20 +469,14 @@ def newton_orbit(
         failure = error
     status, settled = settle_motion(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
     if status is Status.DONE:
-        try:
+        with suppress(OrbitError):
             return _solve_with_rounds(point, turns, settled)
-        except OrbitError:
-            pass
     ranges = start_ranges(parameters, drive, guess)
     for number in range(SETS):
         for place in spread_starts(parameters, drive, guess, STARTS, number, ranges):
-            found = approach_orbit(point, turns, place)
-            if found is None:
-                continue
-            try:
-                return solve_orbit(point, turns, found)
-            except OrbitError:
-                pass
+            if (found := approach_orbit(point, turns, place)) is not None:
+                with suppress(OrbitError):
+                    return solve_orbit(point, turns, found)
     raise failure
 
 
@@ -515,12 +509,9 @@ def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> 
 
 
 def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return the numbers of full turns that undriven links without a ratio in the drive make in the period after a start.
+    """Return the full turns that undriven links without a ratio in the drive make in the period after a start, by FMI name.
 
-    Returns
-    -------
-    dict of str to int
-        Number of full turns by FMI name of the coordinate; links that only swing are left out.
+    Links that only swing are left out.
     """
     flow, ratios = point.flow, point.drive.ratios_by_freedom(point.mechanism)
     swinging = {name: i for name, i in flow.swinging.items() if flow.free[i] not in ratios}
@@ -535,14 +526,8 @@ def approach_orbit(
 ) -> FloatArray | None:
     """Search for a periodic motion from a guess that may be far away; return the start of the motion, or None if none is found.
 
-    The start is accurate only to `SEARCH_TOLERANCE`.
-
-    Parameters
-    ----------
-    place : ndarray, shape (n,)
-        Guess of the start.
-    known : ndarray, shape (m, n), optional
-        Starts of known motions; deflation keeps the search from finding them again: see `kernels.search`.
+    The start is accurate only to `SEARCH_TOLERANCE`. ``place`` is the guess, shape (n,). ``known``, shape (m, n), are the
+    starts of known motions, which deflation keeps the search from finding again: see `kernels.search`.
     """
     n, start = point.flow.size, place.copy()
     status = kernels.search(
@@ -560,22 +545,12 @@ def approach_orbit(
 def approach_uniform_rotation(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
     """Search by multiple shooting for a periodic motion near a uniform rotation; the motion may be very unstable.
 
-    Parameters
-    ----------
-    place : ndarray, shape (n,)
-        y of the uniform rotation, the same at all crank angles.
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        Start of the motion; None if none is found.
+    ``place``, shape (n,), is y of the uniform rotation, the same at all crank angles. Return the start, or None if none is
+    found.
     """
     k, n = EVEN_PIECES * turns * point.flow.commons, point.flow.size
-    angles, starts, scale = (
-        np.linspace(0.0, point.flow.period * turns, k + 1),
-        np.tile(place, (k, 1)),
-        point.scale(place),
-    )
+    angles, starts = np.linspace(0.0, point.flow.period * turns, k + 1), np.tile(place, (k, 1))
+    scale = point.scale(place)
     for _ in range(SEARCH_ITERATIONS):
         try:
             gaps, jacobian = _close(point.shoot(angles, starts), starts)
@@ -770,7 +745,7 @@ class OrbitEquations:
         self._shape = len(self.angles) - 1, flow.size
         self._discretised = Discretisation(self.angles, can_collocate((drive, last), (mechanism, other)))
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
-        self._direction = family.direction(high, low, high) if mechanism is other else None
+        self._direction = family.direction(high, low, high) if mechanism == other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
         """Return the scale of each unknown, its typical magnitude: the larger of the scales at the two ends of the range."""

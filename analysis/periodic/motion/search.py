@@ -11,7 +11,7 @@ machine does, including jumps between motions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -114,7 +114,6 @@ def sweep(
     *,
     drive: Drive | None = None,
     start: ArrayLike | None = None,
-    watch: Callable[[float], None] | None = None,
 ) -> Sweep:
     """Step through crank speeds as a machine does: each steady motion starts from the steady motion at the last speed.
 
@@ -133,8 +132,6 @@ def sweep(
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0 for the first speed: for a five-bar u (m) and u' (m/s). By default the coordinates with
         which the mechanism starts, at rest.
-    watch : callable, optional
-        Called with each speed (rad/s) after its search.
 
     Raises
     ------
@@ -169,8 +166,6 @@ def sweep(
         last = orbit
         if orbit is not None:
             state = orbit.start
-        if watch:
-            watch(speed)
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, lru_cache, partial
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,15 +171,6 @@ def format_value(name: str, value: float, unit: str) -> str:
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
 
-@lru_cache(maxsize=64)
-def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Return parameters with new values, given as (FMI name, value).
-
-    The result is cached, because all points in a row of a chart over the speed have the same values.
-    """
-    return replace(parameters, **dict(values))
-
-
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Return the mechanism and the drive with new values of parameters, which are given by FMI name."""
@@ -214,7 +205,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
         else:
             of_drive["motor"] = motor
     return (
-        _replace_parameters(parameters, *of_mechanism.items()) if of_mechanism else parameters,
+        replace(parameters, **of_mechanism) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
     )
 
@@ -317,10 +308,15 @@ class Family:
         """Return the family with new ratios: turns of the other cranks and of links per turn of the crank, see `Drive`."""
         if ratios == self.drive.ratios:
             return self
-        drive = replace(self.drive, ratios=ratios)
-        return replace(
-            self, drive=drive, vary=partial(_with_ratios, self.vary, ratios) if callable(self.vary) else self.vary
-        )
+        found, vary = replace(self, drive=replace(self.drive, ratios=ratios)), self.vary
+        if isinstance(vary, str):
+            return found
+
+        def varied(value: float) -> Operation:
+            parameters, drive = vary(value)
+            return parameters, replace(drive, ratios=ratios)
+
+        return replace(found, vary=varied)
 
     def format_value(self, value: float) -> str:
         """Format a value of the family's parameter with its name and unit; speeds are also given in rpm."""
@@ -338,12 +334,6 @@ class Family:
             *((d.vector(mechanism), np.array(p.constants())) for p, d in (self.operation(a), self.operation(b)))
         )
         return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
-
-
-def _with_ratios(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
-    """Return the mechanism and the drive that ``vary`` gives for a value, with new ratios in the drive."""
-    parameters, drive = vary(value)
-    return parameters, replace(drive, ratios=ratios)
 
 
 FloatArray = NDArray[np.float64]

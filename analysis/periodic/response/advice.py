@@ -192,11 +192,10 @@ def _branch_arcs(branch: Branch, branches: Sequence[Branch], low: float, high: f
     places = [place for place, _ in passed]
     special = [point.orbit for _, point in passed]
     parameter = np.insert(branch.parameter, places, [point.parameter for _, point in passed])
-    amplitudes = branch.amplitudes
+    amplitudes, start = branch.amplitudes, np.array([orbit.start for orbit in branch.orbits])
     if special:
         amplitudes = np.insert(amplitudes, places, [orbit.amplitudes for orbit in special], axis=0)
-    start = np.array([orbit.start for orbit in branch.orbits])
-    start = np.insert(start, places, [orbit.start for orbit in special], axis=0) if special else start
+        start = np.insert(start, places, [orbit.start for orbit in special], axis=0)
     # at a special point a multiplier is on the unit circle: stability is taken from the neighbouring points
     holds = np.insert(branch.largest_multiplier <= 1.0 + TOLERANCE, places, True)
     stable = holds[1:] & holds[:-1]

@@ -9,7 +9,7 @@ twice the period.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
@@ -253,14 +253,13 @@ def switch(
     greatest: float = 2e-2,
     largest: float = GREATEST_MULTIPLIER,
     most_points: int = 5000,
-    watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
     """Follow the branch that begins at a period doubling, of twice the period, or at a branch point, of the same period.
 
     Parameters
     ----------
-    family, low, high, greatest, most_points, watch, stop
+    family, low, high, greatest, most_points, stop
         See `follow`.
     special : SpecialPoint
     side : float
@@ -297,7 +296,7 @@ def switch(
             continue
         away = (np.append(taken.y, taken.parameter) - np.append(orbit.start, special.parameter)) / follower.scale
         if np.abs(away).max() < BEGINNING and (times == 1 or np.linalg.norm(_half_shift(taken, scale)) > length):
-            return _branch(family, begun.turns, follower, taken, watch, stop, largest)
+            return _branch(family, begun.turns, follower, taken, None, stop, largest)
     motion = "of twice the period" if times > 1 else "that branches off"
     raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
 
@@ -618,3 +617,9 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
     away = ends[0].flow.remove_turns(points[:, :-1] - motion)
     near = np.abs(away / scale[:-1]).max(axis=1).argmin()
     return distance(points / scale, np.append(points[near, :-1] - away[near], value) / scale) < _ON
+
+
+def has_motion(branches: Iterable[Branch], orbit: PeriodicOrbit, value: float, width: float) -> bool:
+    """Return whether one of the branches passes a motion, at whichever turn of its period the motion is taken to begin."""
+    starts = orbit.passages()
+    return any(passes(b, value, start, width) for b in branches if b.turns == orbit.turns for start in starts)

@@ -34,7 +34,7 @@ from ...units import Amount, quantity
 from .. import motion
 from ..stability import SpecialPoint
 from .advice import AvoidedRange, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
-from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
+from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, has_motion, switch
 
 #: Number of crank angles over which the effective mass is averaged.
 MASS_SAMPLES = 1024
@@ -536,10 +536,8 @@ class _Search:
                 self.problems.append(describe_end(branch))
 
     def _knows(self, orbit: motion.PeriodicOrbit, value: float) -> bool:
-        """Return whether a known branch passes through a motion, at whichever turn the motion is taken to begin."""
-        own = [branch for branch in self.branches if branch.turns == orbit.turns]
-        starts = orbit.passages()
-        return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)
+        """Return whether a known branch passes through a motion."""
+        return has_motion(self.branches, orbit, value, self.high - self.low)
 
     def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
         self.branches.append(branch)

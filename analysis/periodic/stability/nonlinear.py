@@ -4,8 +4,7 @@ On the centre manifold of a special point the map over a period is one of a few 
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
 supercritical period doubling, torus point or branch point a new stable motion grows out of the motion of the branch; beyond a
 subcritical point the mechanism jumps to another motion. The second and third derivatives of the map are computed by finite
-differences along eigenvectors. `confirm_form` compares the normal form, and `confirm` the verdict, with a long run of the
-mechanism.
+differences along eigenvectors. `confirm` compares a verdict with a long run of the mechanism.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from ...mechanisms import Parameters
 from ...run import simulate, takes_published
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import Drive
-from ..motion.flow import TOLERANCE, Crossing, Stability, StabilityVerdict, torus_pair
+from ..motion.flow import Crossing, Stability, StabilityVerdict, torus_pair
 from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family
 
@@ -63,9 +62,6 @@ _LOCATED = 1e-2
 #: Relative uncertainty of a coefficient above which its sign is not settled.
 UNSETTLED = 0.1
 _UNSETTLED = "not settled"
-#: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; wanted square of the
-#: distance from the motion of the branch; periods of the run.
-_BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
 FloatArray = NDArray[np.float64]
 Form = Callable[..., NDArray[np.complex128]]
 
@@ -96,18 +92,10 @@ class NormalForm:
 
 
 class Forms(NamedTuple):
-    """Second and third derivatives of a map at the fixed point zero as multilinear forms B and C, by finite differences.
+    """Second and third derivatives of a map at the fixed point zero as multilinear forms B and C, by finite differences."""
 
-    Attributes
-    ----------
-    function : callable
-        The map, from shape (n,) to (n,).
-    matrix : ndarray, shape (n, n)
-        First derivative of the map at zero.
-    """
-
-    function: Callable[[FloatArray], FloatArray]
-    matrix: FloatArray
+    function: Callable[[FloatArray], FloatArray]  # the map, from shape (n,) to (n,)
+    matrix: FloatArray  # first derivative of the map at zero, (n, n)
 
     def second_form(self, x: FloatArray, h: float) -> FloatArray:
         """Return the second derivative B(x, x) by finite differences with the step h."""
@@ -229,15 +217,8 @@ def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float
 def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
     """Compute the coefficient of a normal form by Kuznetsov's equation (5.25), (5.27) or (5.28): see `NormalForm`.
 
-    Parameters
-    ----------
-    forms : Forms
-        Derivatives of the map at the special point.
-    kind : Crossing
-    multiplier : complex
-        For a torus: one multiplier of the pair on the unit circle.
-    h : float
-        Step of the finite differences.
+    ``forms`` are the derivatives of the map at the special point, ``h`` the step of the finite differences. ``multiplier`` is
+    used for a torus alone: one multiplier of the pair on the unit circle.
     """
     matrix, unit = forms.matrix, np.eye(len(forms.matrix))
     if kind is Crossing.TORUS:
@@ -250,7 +231,7 @@ def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float
             + b(v.conj(), np.linalg.solve(turn**2 * unit - matrix, b(v, v)))
         )
         return float(0.5 * (np.vdot(left, inner) / turn).real)
-    q, p = _real_eigenvectors(matrix, kind.sign)
+    q, p = (vector.real for vector in _eigenvectors(matrix, kind.sign)[:2])
     second = forms.second_form(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
@@ -261,12 +242,6 @@ def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float
     length = float(np.linalg.norm(w)) or 1.0
     mixed = length * (forms.second_form(q + w / length, h) - forms.second_form(q - w / length, h)) / 4.0
     return float(p @ (forms.third_form(q, h) + 3.0 * mixed)) / 6.0
-
-
-def _real_eigenvectors(matrix: FloatArray, value: float) -> tuple[FloatArray, FloatArray]:
-    """Return the right and left eigenvectors of a real eigenvalue: see `_eigenvectors`."""
-    right, left, _ = _eigenvectors(matrix, value)
-    return right.real, left.real
 
 
 #: Quadratic coefficient, relative to the root of the cubic one, above which a branch point is transcritical: zero by symmetry.
@@ -290,77 +265,6 @@ def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
     slope = point.period(start, special.orbit.turns, direction).slope
     return float(p.real @ (slope / point.scale(start)))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FormRun:
-    """A run near a period doubling, torus point or branch point, on the side where the motion of the branch is unstable.
-
-    ``distance`` is the greatest distance from the motion of the branch over the last periods, relative to the scale of y, and
-    infinite if the run ended early; ``expected`` is the distance that the normal form predicts for a supercritical point.
-    """
-
-    parameter: float
-    distance: float
-    expected: float
-
-    def agrees(self, form: NormalForm) -> bool:
-        """Return whether the run agrees with the normal form.
-
-        If the form is supercritical, the distance of the run must be the expected distance within a factor of two. If the form
-        is subcritical, the distance must be more than three times the expected distance.
-        """
-        if form.words == "supercritical":
-            return 0.5 * self.expected < self.distance < 2.0 * self.expected
-        return form.words == "subcritical" and self.distance > 3.0 * self.expected
-
-
-def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
-    """Run the mechanism near a special point, from a small deviation, on the side where the motion of the branch is unstable.
-
-    Raises
-    ------
-    InputError
-        If the point is a fold: the branch has no motion beyond a fold.
-    LinkworkError
-        If the motion of the branch is unstable on neither side, or only over a range too narrow for a run.
-    """
-    if special.kind is Crossing.FOLD:
-        raise InputError("beyond a fold the branch has no motion from which a run could deviate")
-    step = 1e-3 * max(abs(special.parameter), 1e-9)
-    sides: list[tuple[float, PeriodicOrbit]] = []
-    for sign in (-1.0, 1.0):
-        value = special.parameter + sign * step
-        parameters, drive = family.operation(value)
-        sides.append(
-            (sign, newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False))
-        )
-    rates = [(orbit.largest - special.orbit.largest) / step for _, orbit in sides]
-    sign, rate = max(zip((-1.0, 1.0), rates), key=lambda pair: pair[1])
-    if rate <= 0.0:
-        raise LinkworkError(f"the motion at {family.format_value(special.parameter)} is unstable on neither side")
-    beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
-    value = special.parameter + sign * beyond / rate
-    parameters, drive = family.operation(value)
-    old = newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
-    if old.largest <= 1.0:
-        raise LinkworkError(
-            f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow for a run"
-        )
-    scale = old.scale
-    expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
-    q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
-    y = old.start + 0.2 * expected * scale * q / np.linalg.norm(q)
-    distances = []
-    for _ in range(_TURNS):
-        try:
-            y = y + old.point.period(y, old.turns).shift
-        except LinkworkError:
-            return FormRun(parameter=value, distance=np.inf, expected=expected)
-        distances.append(float(np.linalg.norm((y - old.start) / scale)))
-        if distances[-1] > 10.0 * expected:
-            break
-    return FormRun(parameter=value, distance=max(distances[-20:]), expected=expected)
 
 
 # Long runs
@@ -436,7 +340,6 @@ def confirm(
     turns: int | None = None,
     start: ArrayLike | None = None,
     disturbance: float = DISTURBANCE,
-    tolerance: float = TOLERANCE,
 ) -> Confirmation:
     """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
 
@@ -451,8 +354,6 @@ def confirm(
         Guess of the orbit.
     disturbance : float
         Distance from the orbit at the start, relative to the scale of y, in the direction of greatest growth.
-    tolerance : float
-        Tolerance of the verdict.
 
     Raises
     ------
@@ -469,7 +370,7 @@ def confirm(
             f"between {NOISE:g} and {LINEAR:g}"
         )
     orbit = newton_orbit(parameters, drive, start=start)
-    verdict = orbit.verdict(tolerance)
+    verdict = orbit.verdict()
     if turns is None:
         # enough to change the deviation by more than NOTABLE, if possible
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))

@@ -230,62 +230,38 @@ class MotionGradient:
 
     # Outputs
 
-    def greatest(self, name: str) -> Gradient:
-        """Return the gradient of the greatest value over the period of the output with this FMI name."""
-        return self._extreme(self._numbers(name, False), 1.0)
-
-    def least(self, name: str) -> Gradient:
-        """Return the gradient of the least value over the period of the output with this FMI name."""
-        return self._extreme(self._numbers(name, False), -1.0)
-
     def peak(self, name: str) -> Gradient:
         """Return the gradient of the greatest modulus, over the period, of an output or a joint force.
 
         ``name`` is the FMI name of the output, such as ``drive.applied_torque``, or the name of the joint force, such as
         ``pin.A``.
         """
-        return self._extreme(self._numbers(name, True), 0.0)
-
-    def _numbers(self, name: str, joints: bool) -> list[int]:
-        outputs = self.orbit.flow.mechanism.output_names
-        if name in outputs:
-            return [outputs.index(name)]
-        own = self.orbit.flow.mechanism.joints if joints else {}
-        if name in own:
-            return [outputs.index(part) for part in own[name]]
-        raise unknown_name(name, (*outputs, *own))
-
-    @cached_property
-    def _outputs(self) -> FloatArray:
-        return self.variations.outputs()
-
-    def _extreme(self, numbers: list[int], sign: float) -> Gradient:
-        """Return the gradient of the greatest (sign 1) or least (-1) value of an output, or of the greatest modulus (0).
-
-        ``numbers`` are the indices of the outputs; for the modulus of a force, those of its components.
-        """
+        mechanism = self.orbit.flow.mechanism
+        known = {output: (output,) for output in mechanism.output_names} | mechanism.joints
+        if name not in known:
+            raise unknown_name(name, known)
+        numbers = [mechanism.output_names.index(part) for part in known[name]]
         values = self._outputs[..., numbers]
-        value, place = self.variations.greatest_value(sign * values[..., 0] if sign else values)
+        value, place = self.variations.greatest_value(values)
         by = np.zeros(len(self.names))
         for column, number in enumerate(numbers):
             by_y, by_constant = self.variations.output_derivatives(place.panel, number)
             change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
             # to first order the value of an extremum does not depend on its place
-            share = sign or place.weights @ values[place.panel, :, column] / value
+            share = place.weights @ values[place.panel, :, column] / value
             by += share * (place.weights @ change)
-        return self._gradient(value, by) if sign == 0.0 else self._gradient(sign * value, sign * by)
+        return self._gradient(value, by)
+
+    @cached_property
+    def _outputs(self) -> FloatArray:
+        return self.variations.outputs()
 
     # Stability
 
     @cached_property
     def monodromy(self) -> FloatArray:
         """Derivatives of the monodromy matrix with respect to the parameters, shape (n, n, m)."""
-        v, solution = self.variations, self._solution[0]
-        columns = []
-        for column in range(self.orbit.flow.size):
-            by_y, by_constant = v.second_derivatives(v.fundamental[..., column])
-            columns.append(v.final_deviation(by_y @ solution + by_constant @ self.along))
-        return np.stack(columns, axis=1)
+        return self.variations.monodromy_derivatives(self._solution[0], self.along)
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -311,14 +287,9 @@ class MotionGradient:
 
         The function is smooth even where two multipliers meet, whereas their moduli are not.
         """
-        matrix, by = _singular_matrix(self.orbit.monodromy, self.monodromy, kind)
-        total = np.zeros(len(self.names))
-        for column in range(len(matrix)):
-            # the determinant is linear in each column
-            replaced = np.repeat(matrix[None], len(self.names), axis=0)
-            replaced[:, :, column] = by[:, column].T
-            total += np.linalg.det(replaced)
-        return self._gradient(float(np.linalg.det(matrix)), total)
+        sign = -1.0 if kind is Crossing.TORUS else 1.0  # of the products of multipliers minus 1, as in `crossing_test`
+        matrix, by = (sign * part for part in singular_matrix(self.orbit.monodromy, kind, self.monodromy))
+        return self._gradient(float(np.linalg.det(matrix)), determinant_derivatives(matrix, by))
 
     @property
     def largest(self) -> Gradient:
@@ -417,7 +388,8 @@ def crossing_gradient(
         If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
         two folds meet, or two branches cross.
     """
-    _require_derivative(kind)
+    if kind is Crossing.BRANCH_POINT:
+        raise LinkworkError("two branches cross: the place has no derivative, as they part when a symmetry is broken")
     others = _other_names(orbit, along, names)
     orbit = _locate_motion(
         orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
@@ -436,38 +408,6 @@ def crossing_gradient(
         amplitude=Gradient(value=amplitude.value, names=others, by=by, at=at),
         orbit=orbit,
     )
-
-
-def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
-    """Compute the normal of the stability boundary in the space of parameters, at one of its points.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        A motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`.
-    kind : Crossing
-    names : sequence of str
-        FMI names of the parameters, such as the two axes of a chart.
-
-    Returns
-    -------
-    Gradient
-        Gradient of a function that is zero on the boundary: for a period doubling or torus point `MotionGradient.test`; for a
-        fold the shift of the map over a period along the left eigenvector.
-
-    Raises
-    ------
-    LinkworkError
-        If the kind is a branch point.
-    """
-    _require_derivative(kind)
-    motion = MotionGradient(orbit, names)
-    return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
-
-
-def _require_derivative(kind: Crossing) -> None:
-    if kind is Crossing.BRANCH_POINT:
-        raise LinkworkError("two branches cross: the place has no derivative, as they part when a symmetry is broken")
 
 
 def _other_names(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
@@ -559,11 +499,13 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
     return motion.test(kind).by
 
 
-def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
+def singular_matrix(matrix: FloatArray, kind: Crossing, by: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
     """Return a square matrix that is singular at a crossing, and its derivatives, shape (..., m).
 
-    ``matrix`` is the monodromy matrix and ``by`` its derivatives.
+    ``matrix`` is the monodromy matrix and ``by`` its derivatives, shape (n, n, m). The determinant is positive if all
+    multipliers are inside the unit circle.
     """
+    by = np.zeros((*matrix.shape, 0)) if by is None else by
     if kind is not Crossing.TORUS:
         return np.eye(len(matrix)) - kind.sign * matrix, -kind.sign * by
     # the second compound matrix has the products of two multipliers as eigenvalues
@@ -573,7 +515,18 @@ def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tupl
         return a[np.ix_(i, i)] * b[np.ix_(j, j)] - a[np.ix_(i, j)] * b[np.ix_(j, i)]
 
     whole = matrix[:, :, None]
-    return minors(matrix, matrix) - np.eye(len(i)), minors(by, whole) + minors(whole, by)
+    return np.eye(len(i)) - minors(matrix, matrix), -minors(by, whole) - minors(whole, by)
+
+
+def determinant_derivatives(matrix: FloatArray, by: FloatArray) -> FloatArray:
+    """Return the derivatives of the determinant of a matrix, shape (m,), from those of its entries, (n, n, m)."""
+    total = np.zeros(by.shape[-1])
+    for column in range(len(matrix)):
+        # the determinant is linear in each column
+        replaced = np.repeat(matrix[None], len(total), axis=0)
+        replaced[:, :, column] = by[:, column].T
+        total += np.linalg.det(replaced)
+    return total
 
 
 def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:

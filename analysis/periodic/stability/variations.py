@@ -331,6 +331,15 @@ class Variations:
 
     # Results
 
+    def monodromy_derivatives(self, ways: FloatArray, constants: FloatArray) -> FloatArray:
+        """Return the derivatives of the monodromy matrix with respect to m numbers, shape (n, n, m).
+
+        ``ways`` are the derivatives of y at the nodes with respect to these numbers, shape (k, s, n, m); ``constants`` are
+        those of the drive vector and, below them, of the constants, shape (c, m).
+        """
+        second = (self.second_derivatives(column) for column in np.moveaxis(self.fundamental, -1, 0))
+        return np.stack([self.final_deviation(by_y @ ways + by_k @ constants) for by_y, by_k in second], axis=1)
+
     def integral(self, values: FloatArray) -> FloatArray:
         """Integrate over the period a quantity with given values at the nodes, shape (k, s, ...)."""
         return np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
