@@ -381,12 +381,6 @@ def find_channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is not a force on a freedom of the {mechanism.name}")
 
 
-def check_argument(channel: Channel, inputs: Inputs) -> None:
-    """Raise InputError if the controller's channel is among the inputs."""
-    if channel.argument in inputs:
-        raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
-
-
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(stop_time="s")
 def control_loop(
@@ -437,7 +431,8 @@ def control_loop(
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
     channel = find_channel(mechanism, controller.channel)
-    check_argument(channel, inputs)
+    if channel.argument in inputs:
+        raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
     # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)

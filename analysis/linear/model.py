@@ -62,9 +62,7 @@ class Layout:
     free: tuple[int, ...]  # indices of the degrees of freedom that forces move
     commanded: tuple[int, ...]  # indices of those with commanded rates
     forces: tuple[int, ...]  # indices of the channels whose forces act
-    input_names: tuple[
-        str, ...
-    ]  # the forces, then acceleration, speed and coordinate of each commanded degree of freedom
+    input_names: tuple[str, ...]  # the forces, then acceleration, speed and coordinate of each commanded one
     state_names: tuple[str, ...]  # the free coordinates, then their rates
 
 
@@ -274,11 +272,6 @@ class LinearModel(Matrices):
         return f"<LinearModel of {self.mechanism.name}: states {states}; inputs {inputs}; poles {self.poles.round(4).tolist()}>"
 
     @property
-    def inputs(self) -> Inputs:
-        """Inputs at the operating point, as constants; the time derivatives of commanded rates are left out."""
-        return constant_inputs(self.mechanism, self.modes, self.channels)
-
-    @property
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of A (1/s), by magnitude."""
         return sort_by_magnitude(np.linalg.eigvals(self.A))
@@ -365,16 +358,6 @@ def _index(name: str, names: tuple[str, ...]) -> int:
     if name not in names:
         raise unknown_name(name, names)
     return names.index(name)
-
-
-def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> Inputs:
-    """Return inputs that hold the channels at the values ``channels``, in the given modes."""
-    values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
-    forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
-    acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # an argument that chooses a mode but is not a channel is a flag, such as groove
-    chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
-    return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from linkwork.errors import InputError
 
-from ..run import Inputs, check_run, encode, float_array, sample, sample_times
+from ..run import float_array, sample_times
 from ..units import Amount
-from .loop import Controller, LoopResult, Reference, check_argument, find_channel, run_loop
-from .model import FloatArray, LinearModel, sample_channels
+from .loop import Controller, LoopResult, Reference, find_channel, run_loop
+from .model import FloatArray, LinearModel
 from .periodic import PeriodicModel
 
 #: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
@@ -29,15 +29,13 @@ class _Linear:
         self,
         model: LinearModel | PeriodicModel,
         channel: str,
-        inputs: Inputs | None,
         averaged: bool,
         deviation: FloatArray,
     ) -> None:
         one = model if isinstance(model, LinearModel) else model.mean()
         self.mechanism, self.places = one.mechanism, one.places
-        self.encoded = None if inputs is None else encode(check_run(self.mechanism, inputs, None)[0], self.mechanism)
         n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)
-        self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
+        self.own = forces.index(self.mechanism.input_names.index(channel))
         still, acting = one.state[:n], one.channels[forces]
         self.motion: Callable[[float], FloatArray] = lambda t: still
         self.acting: Callable[[float], FloatArray] = lambda t: acting
@@ -51,8 +49,7 @@ class _Linear:
             self.a, self.b = model.interpolate(model.A), model.interpolate(model.B)
         self.rate = float(np.abs(np.linalg.eigvals(model.A)).max())
         self.x = deviation
-        self.t = 0.0
-        self.held: dict[int, float] = {}
+        self.t = self.force = 0.0
 
     def measure(self) -> Sequence[float]:
         values = self.motion(self.t).copy()
@@ -60,19 +57,15 @@ class _Linear:
         return [float(value) for value in values]
 
     def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
-        if self.encoded is not None:
-            x = np.array([*measured, 0.0, 0.0])
-            self.held = dict(enumerate(sample(self.encoded, time, x, self.encoded.source.laws)[self.forces]))
-        self.held[self.own] = force
+        self.force = force
 
     def step(self, time: float, step: float) -> tuple[int, str]:
         count = max(1, ceil(step * self.rate / FINE_STEP))
         h = step / count
-        # forces that are not held are those of the motion
-        held, forces = list(self.held), np.array(list(self.held.values()))
 
         def rates(t: float, x: FloatArray) -> FloatArray:
-            return self.a(t) @ x + self.b(t)[:, held] @ (forces - self.acting(t)[held])
+            # all other forces are those of the motion
+            return self.a(t) @ x + self.b(t)[:, self.own] * (self.force - self.acting(t)[self.own])
 
         for number in range(count):
             t = time + number * h
@@ -89,7 +82,6 @@ def predict_loop(
     model: LinearModel | PeriodicModel,
     controller: Controller,
     reference: Reference,
-    inputs: Inputs | None = None,
     *,
     stop_time: Amount,
     deviation: ArrayLike | None = None,
@@ -101,12 +93,9 @@ def predict_loop(
     ----------
     model : LinearModel or PeriodicModel
         Model about an equilibrium or about a periodic motion. The deviations are added to this equilibrium or motion; the run
-        starts at the first sample of the motion.
+        starts at the first sample of the motion. Inputs other than the controller's force are those of the operating point.
     controller, reference, stop_time
         As for `control_loop`.
-    inputs : Inputs, optional
-        Forces that act; commanded degrees of freedom move as at the operating point. By default all forces are those of the
-        operating point.
     deviation : array_like, shape (2 n,), optional
         Deviation of the model's state from its operating point at the start.
     averaged : bool
@@ -127,27 +116,9 @@ def predict_loop(
         raise InputError(f"the controller acts by {controller.channel}, which is not an input of the model")
     if isinstance(model, LinearModel):
         _check_rest(model)
-    if inputs is not None:
-        check_argument(channel, inputs)
-        _check_inputs(model, inputs)
     times = sample_times(stop_time, controller.period)
-    plant = _Linear(model, controller.channel, inputs, averaged, start)
+    plant = _Linear(model, controller.channel, averaged, start)
     return run_loop(plant, controller, reference, times, channel.freedom)
-
-
-def _check_inputs(model: LinearModel | PeriodicModel, inputs: Inputs) -> None:
-    """Raise InputError if an input does not act in a model, or commands another speed than that of the operating point."""
-    mechanism, its = model.mechanism, model.layout
-    for number, channel in enumerate(mechanism.channels):
-        acts = channel.freedom in its.commanded if channel.kind == "command" else number in its.forces
-        if channel.argument in inputs and not acts:
-            coordinate = mechanism.freedoms[channel.freedom].coordinate
-            how = "commanded" if channel.freedom in its.commanded else "not commanded"
-            raise InputError(
-                f"{channel.argument} is among the inputs, but {coordinate} is {how} in the model: leave it out"
-            )
-    times, states = (np.zeros(1), [model.state]) if isinstance(model, LinearModel) else (model.times, model.states)
-    sample_channels(mechanism, inputs, times, np.array(states))
 
 
 def _check_rest(model: LinearModel) -> None:

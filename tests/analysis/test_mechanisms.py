@@ -252,8 +252,6 @@ def test_cart_is_held_in_process_and_through_the_fmu(shaken: PeriodicModel, fmus
 def test_cart_about_its_shaken_motion_is_time_invariant(shaken: PeriodicModel) -> None:
     assert shaken.period == pytest.approx(pi / 10.0)
     np.testing.assert_allclose(shaken.monodromy(), expm(shaken.mean().A * shaken.period), atol=1e-8)
-    wrong = {"speed": 20.0, "force": 5.0}
-    assert linearise_orbit(demo(ROTOR).parameters, shaken.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
 
 
 #: The slider-crank of the FMU with a spring and a damper along the crank's axis.
@@ -295,7 +293,7 @@ def test_a_groove_leaves_one_freedom() -> None:
     """The shift goes with the crank: its inertia is that of both, seen from the crank."""
     grooved = replace(SPRUNG, groove_amplitude=0.05, groove_ratio=2.0)
     model = linearise(grooved, (0.4, 0.0, 2.0, 0.0), Inputs(groove=True))
-    assert (model.state_names, model.inputs) == (("crank.angle", "crank.speed"), Inputs(groove=True, torque=0.0))
+    assert model.state_names == ("crank.angle", "crank.speed")
     exact = differences(SLIDER_CRANK, grooved, model.state, model.places, drive=0.0, axial=2.0)
     np.testing.assert_allclose(model.A, exact, rtol=1e-6)
     assert model.F[0, model.input_names.index("drive.torque")] == pytest.approx(1.0)

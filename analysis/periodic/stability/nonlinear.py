@@ -321,8 +321,8 @@ class Confirmation:
         return self.outcome is Outcome.BOUNDED and abs(self.growth - 1.0 + self.verdict.margin) < 0.1 * margin
 
 
-#: Initial distance of a long run from the orbit, relative to the scale of y; least and greatest distance at which growth is
-#: measured.
+#: Initial distance of a long run from the orbit, in the direction of greatest growth and relative to the scale of y; least and
+#: greatest distance at which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
 #: Size below which a deviation counts as zero.
 TINY = 1e-300
@@ -339,7 +339,6 @@ def confirm(
     *,
     turns: int | None = None,
     start: ArrayLike | None = None,
-    disturbance: float = DISTURBANCE,
 ) -> Confirmation:
     """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
 
@@ -352,23 +351,18 @@ def confirm(
         margin is too small to distinguish growth from decay.
     start : array_like, shape (n,), optional
         Guess of the orbit.
-    disturbance : float
-        Distance from the orbit at the start, relative to the scale of y, in the direction of greatest growth.
 
     Raises
     ------
     OrbitError
         If there is no periodic orbit.
     InputError
-        If the number of turns or the disturbance is not usable.
+        If there are less than 20 turns.
     LinkworkError
         If the run ends within the first turn.
     """
-    if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
-        raise InputError(
-            f"{turns} turns from a disturbance of {disturbance}: there must be at least 20 turns, and the disturbance must be "
-            f"between {NOISE:g} and {LINEAR:g}"
-        )
+    if turns is not None and turns < 20:
+        raise InputError(f"a run of {turns} turns: there must be at least 20 turns")
     orbit = newton_orbit(parameters, drive, start=start)
     verdict = orbit.verdict()
     if turns is None:
@@ -376,7 +370,7 @@ def confirm(
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
     scale = orbit.scale
     direction, measure = _leading_vectors(orbit, scale)
-    begin = orbit.start + disturbance * scale * direction
+    begin = orbit.start + DISTURBANCE * scale * direction
     passed, message = _passages(orbit.point, begin, turns)
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
