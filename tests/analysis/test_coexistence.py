@@ -100,12 +100,6 @@ def test_a_start_ends_where_a_long_run_does(picture: Basins) -> None:
         assert last == pytest.approx(picture.motions[end].start.tolist(), abs=1e-3)
 
 
-def test_ends_add_up(picture: Basins) -> None:
-    assert sum(picture.share(end) for end in (-2, -1, 0, 1)) == pytest.approx(1.0)
-    assert "2 stable motions, 9 x 9 starts" in repr(picture)
-    assert [orbit.amplitude for orbit in picture.motions] == sorted(orbit.amplitude for orbit in picture.motions)
-
-
 def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     rows = np.loadtxt(picture.to_csv(tmp_path / "basins.csv"), delimiter=",", skiprows=1)
     assert rows.shape == (81, 3)

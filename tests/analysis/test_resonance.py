@@ -185,12 +185,6 @@ def test_no_orbit_at_either_end_is_an_error() -> None:
         frequency_response(replace(TABLE_3_1, crank_length=0.5), 40.0, 41.0)
 
 
-def test_whole_numbers_are_ends_of_a_range_too() -> None:
-    response = frequency_response(RIG["c"], 61, 62, doublings=0)
-    assert response.problems == ()
-    assert response.branches[0].parameter[[0, -1]].tolist() == [61.0, 62.0]
-
-
 def test_a_curve_followed_from_both_ends_has_its_maximum_once() -> None:
     parameters = replace(RIG["c"], slider_damping=0.9)
     response = frequency_response(parameters, 540.0 * RPM, 620.0 * RPM, most_points=300)
