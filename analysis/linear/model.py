@@ -387,18 +387,12 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
         return np.moveaxis(array.reshape(array.shape[0], n, columns), 1, 0)
 
     size, inputs = len(its.free), len(its.input_names)
-    y, a, m, c, k, f, h, d = map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))
+    names = ("outputs", "acceleration", "M", "C", "K", "F", "H", "D")
+    arrays = dict(zip(names, map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))))
+    for name in ("outputs", "acceleration"):
+        arrays[name] = arrays[name][:, :, 0]
     # adding 0.0 changes -0.0 to 0.0
-    return {
-        "M": m,
-        "C": c + 0.0,
-        "K": k + 0.0,
-        "F": f,
-        "H": h,
-        "D": d,
-        "outputs": y[:, :, 0],
-        "acceleration": a[:, :, 0],
-    }
+    return arrays | {name: arrays[name] + 0.0 for name in ("C", "K")}
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -125,17 +125,12 @@ def read_tuning_case(
         parameters=case.parameters,
         drive=drive,
         start=rest_guess(case.parameters, drive, case.initial),
-        speeds=wanted.speeds,
-        over=wanted.over,
-        between=wanted.between,
-        turns=wanted.turns,
-        change=wanted.change,
-        no_resonance=wanted.no_resonance,
-        resonance_margin=wanted.resonance_margin,
-        no_jump=wanted.no_jump,
-        no_unstable=wanted.no_unstable,
-        least_margin=wanted.least_margin,
         limits=wanted.peak,
         least="" if wanted.objective == _LEAST_CHANGE else wanted.objective.removeprefix(_LEAST).strip(),
+        **{
+            field.name: getattr(wanted, field.name)
+            for field in fields(wanted)
+            if field.name not in ("peak", "objective")
+        },
     )
     return TuningCase(title=case.title, wish=wish, tables=tables, folder=folder)
