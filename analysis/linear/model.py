@@ -387,8 +387,8 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
         return np.moveaxis(array.reshape(array.shape[0], n, columns), 1, 0)
 
     size, inputs = len(its.free), len(its.input_names)
-    names = ("outputs", "acceleration", "M", "C", "K", "F", "H", "D")
-    arrays = dict(zip(names, map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))))
+    order = ("outputs", "acceleration", "M", "C", "K", "F", "H", "D")
+    arrays = dict(zip(order, map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))))
     for name in ("outputs", "acceleration"):
         arrays[name] = arrays[name][:, :, 0]
     # adding 0.0 changes -0.0 to 0.0
