@@ -110,14 +110,17 @@ from .response.frequency import natural_frequency as natural_frequency
 from .response.frequency import stiffness_name as stiffness_name
 from .response.frequency import with_isolas as with_isolas
 from .stability.nonlinear import Confirmation as Confirmation
+from .stability.nonlinear import FormRun as FormRun
 from .stability.nonlinear import NormalForm as NormalForm
 from .stability.nonlinear import Outcome as Outcome
 from .stability.nonlinear import SpecialPoint as SpecialPoint
 from .stability.nonlinear import confirm as confirm
+from .stability.nonlinear import confirm_form as confirm_form
 from .stability.nonlinear import normal_form as normal_form
 from .stability.sensitivity import Gradient as Gradient
 from .stability.sensitivity import MotionGradient as MotionGradient
 from .stability.sensitivity import PointGradient as PointGradient
+from .stability.sensitivity import boundary_gradient as boundary_gradient
 from .stability.sensitivity import crossing_gradient as crossing_gradient
 from .stability.sensitivity import determinant_derivatives as determinant_derivatives
 from .stability.sensitivity import extremum_gradient as extremum_gradient

@@ -24,6 +24,7 @@ from analysis.periodic import (
     MotionGradient,
     PeriodicOrbit,
     Stability,
+    boundary_gradient,
     crossing_gradient,
     crossing_test,
     extrema,
@@ -306,6 +307,9 @@ def test_a_special_point_moves_as_its_differences_say(name: str) -> None:
         )
         exact = np.array([found.place.by[column], found.amplitude.by[column]])
         assert close(differences, exact, size, step), (parameter, differences, exact)
+    # the normal of the boundary over two parameters is across the direction in which it goes
+    normal = boundary_gradient(found.orbit, kind, (along, "slider.damping"))
+    assert normal["slider.damping"] / normal[along] == pytest.approx(-found.place["slider.damping"], rel=1e-8)
     # from a motion beside it the same point is found
     beside = changed(found.orbit, along, found.place.value * (0.998 if kind is Crossing.FOLD else 1.001))
     again = crossing_gradient(beside, kind, along, ("slider.damping",))

@@ -18,6 +18,8 @@ from analysis.periodic import (
     Risk,
     SpecialPoint,
     Stability,
+    boundary_gradient,
+    confirm_form,
     find_orbit,
     find_orbits,
     follow,
@@ -235,9 +237,12 @@ def test_the_pendulum_breaks_its_symmetry_at_a_branch_point() -> None:
     assert own.kind is Crossing.BRANCH_POINT
     form = normal_form(response.family, own)
     assert form.words == "supercritical"
+    assert confirm_form(response.family, own, form).agrees(form)
     names = "rotor.excitation", "rotor.damping"
     with pytest.raises(LinkworkError, match="branches cross"):
         special_gradient(response.family, own)
+    with pytest.raises(LinkworkError, match="branches cross"):
+        boundary_gradient(own.orbit, own.kind, names)
     with pytest.raises(InputError, match="singular"):
         follow_crossing(plane(parameters, drive, *names), own.orbit, own.kind, (ends[0], 0.1), x=ends, y=(0.0, 1.0))
     # half a period of a symmetric motion ends in its mirror image; it breaks where a deviation ends in itself

@@ -23,6 +23,7 @@ from analysis.periodic import (
     Drive,
     Stability,
     basins,
+    confirm_form,
     describe_end,
     describe_turns,
     find_orbit,
@@ -30,6 +31,7 @@ from analysis.periodic import (
     frequency_response,
     join_orbits,
     newton_orbit,
+    normal_form,
     special_gradient,
     stability_chart,
     sweep,
@@ -40,7 +42,7 @@ from analysis.periodic.motion.discretisation import operating_point
 from analysis.run import Inputs, load_case, load_parameters
 from analysis.tuning import Wish, load_tuning_case, tune
 from analysis.units import RAD_S_PER_RPM
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import PublishedSet
 
 coexistences = import_module("analysis.periodic.chart.coexistence")
@@ -95,6 +97,14 @@ def test_a_chart_has_the_tongue_in_which_the_pendulum_swings_at_the_speed_of_the
         for speed, damping in traced.points[::10].tolist():
             assert abs(mathieu(speed, damping=damping) - 1.0).min() < 1e-5
     assert chart.problems == ()
+
+
+def test_a_run_confirms_no_normal_form_where_the_motion_is_stable_again_nearby() -> None:
+    narrow = replace(yoke("yoke-narrow").parameters, hinge_damping=1e-4)
+    response = frequency_response(narrow, 6.9, 7.0, doublings=0)
+    point = response.branches[0].special[0]
+    with pytest.raises(LinkworkError, match="too narrow"):
+        confirm_form(response.family, point, normal_form(response.family, point))
 
 
 def test_from_a_start_that_goes_round_no_rotation_is_added_to_coexisting_motions() -> None:

@@ -4,7 +4,8 @@ On the centre manifold of a special point the map over a period is one of a few 
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
 supercritical period doubling, torus point or branch point a new stable motion grows out of the motion of the branch; beyond a
 subcritical point the mechanism jumps to another motion. The second and third derivatives of the map are computed by finite
-differences along eigenvectors. `confirm` compares a verdict with a long run of the mechanism.
+differences along eigenvectors. `confirm_form` compares the normal form, and `confirm` the verdict, with a long run of the
+mechanism.
 """
 
 from __future__ import annotations
@@ -62,6 +63,9 @@ _LOCATED = 1e-2
 #: Relative uncertainty of a coefficient above which its sign is not settled.
 UNSETTLED = 0.1
 _UNSETTLED = "not settled"
+#: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; wanted square of the
+#: distance from the motion of the branch; periods of the run.
+_BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
 FloatArray = NDArray[np.float64]
 Form = Callable[..., NDArray[np.complex128]]
 
@@ -265,6 +269,75 @@ def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
     slope = point.period(start, special.orbit.turns, direction).slope
     return float(p.real @ (slope / point.scale(start)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormRun:
+    """A run near a period doubling, torus point or branch point, on the side where the motion of the branch is unstable.
+
+    ``distance`` is the greatest distance from the motion of the branch over the last periods, relative to the scale of y, and
+    infinite if the run ended early; ``expected`` is the distance that the normal form predicts for a supercritical point.
+    """
+
+    parameter: float
+    distance: float
+    expected: float
+
+    def agrees(self, form: NormalForm) -> bool:
+        """Return whether the run agrees with the normal form.
+
+        If the form is supercritical, the distance of the run must be the expected distance within a factor of two. If the form
+        is subcritical, the distance must be more than three times the expected distance.
+        """
+        if form.words == "supercritical":
+            return 0.5 * self.expected < self.distance < 2.0 * self.expected
+        return form.words == "subcritical" and self.distance > 3.0 * self.expected
+
+
+def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
+    """Run the mechanism near a special point, from a small deviation, on the side where the motion of the branch is unstable.
+
+    Raises
+    ------
+    InputError
+        If the point is a fold: the branch has no motion beyond a fold.
+    LinkworkError
+        If the motion of the branch is unstable on neither side, or only over a range too narrow for a run.
+    """
+    if special.kind is Crossing.FOLD:
+        raise InputError("beyond a fold the branch has no motion from which a run could deviate")
+
+    def orbit_at(value: float) -> PeriodicOrbit:
+        parameters, drive = family.operation(value)
+        return newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
+
+    step = 1e-3 * max(abs(special.parameter), 1e-9)
+    largest = [orbit_at(special.parameter + sign * step).largest for sign in (-1.0, 1.0)]
+    rates = [(value - special.orbit.largest) / step for value in largest]
+    sign, rate = max(zip((-1.0, 1.0), rates), key=lambda pair: pair[1])
+    if rate <= 0.0:
+        raise LinkworkError(f"the motion at {family.format_value(special.parameter)} is unstable on neither side")
+    beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
+    value = special.parameter + sign * beyond / rate
+    old = orbit_at(value)
+    if old.largest <= 1.0:
+        raise LinkworkError(
+            f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow for a run"
+        )
+    scale = old.scale
+    expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
+    q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
+    y = old.start + 0.2 * expected * scale * q / np.linalg.norm(q)
+    distances = []
+    for _ in range(_TURNS):
+        try:
+            y = y + old.point.period(y, old.turns).shift
+        except LinkworkError:
+            return FormRun(parameter=value, distance=np.inf, expected=expected)
+        distances.append(float(np.linalg.norm((y - old.start) / scale)))
+        if distances[-1] > 10.0 * expected:
+            break
+    return FormRun(parameter=value, distance=max(distances[-20:]), expected=expected)
 
 
 # Long runs

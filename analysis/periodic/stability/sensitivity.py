@@ -388,8 +388,7 @@ def crossing_gradient(
         If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
         two folds meet, or two branches cross.
     """
-    if kind is Crossing.BRANCH_POINT:
-        raise LinkworkError("two branches cross: the place has no derivative, as they part when a symmetry is broken")
+    _require_derivative(kind)
     others = _other_names(orbit, along, names)
     orbit = _locate_motion(
         orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
@@ -408,6 +407,38 @@ def crossing_gradient(
         amplitude=Gradient(value=amplitude.value, names=others, by=by, at=at),
         orbit=orbit,
     )
+
+
+def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
+    """Compute the normal of the stability boundary in the space of parameters, at one of its points.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`.
+    kind : Crossing
+    names : sequence of str
+        FMI names of the parameters, such as the two axes of a chart.
+
+    Returns
+    -------
+    Gradient
+        Gradient of a function that is zero on the boundary: for a period doubling or torus point `MotionGradient.test`; for a
+        fold the shift of the map over a period along the left eigenvector.
+
+    Raises
+    ------
+    LinkworkError
+        If the kind is a branch point.
+    """
+    _require_derivative(kind)
+    motion = MotionGradient(orbit, names)
+    return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
+
+
+def _require_derivative(kind: Crossing) -> None:
+    if kind is Crossing.BRANCH_POINT:
+        raise LinkworkError("two branches cross: the place has no derivative, as they part when a symmetry is broken")
 
 
 def _other_names(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
