@@ -92,8 +92,9 @@ def test_error_over_the_rounding_of_printed_digits() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded", "path-a"])
+@pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "path-a"])
 def test_no_other_digit_in_a_single_place_gives_the_stated_error(name: str) -> None:
+    """Even if every number may be off by half a unit of its last digit; to first order in these changes."""
     p, unit = PROBLEMS[name], np.array([0.01] * 7 + [np.radians(1.0)] * 3)
     printed = [repr(round(float(x), 6)) for x in p.linkage.vector / unit]
     tolerance = near("", str(p.error), 0.0).upper - p.error
@@ -102,9 +103,24 @@ def test_no_other_digit_in_a_single_place_gives_the_stated_error(name: str) -> N
         for place, digit in product(places, "0123456789"):
             values = [float(x) for x in printed]
             values[k] = float(number[:place] + digit + number[place + 1 :])
-            if values[k]:
-                found = p.linkage_error(Linkage.from_vector(np.array(values) * unit, 1))
-                assert abs(found - p.error) > tolerance, (k, values[k], found)
+            if not values[k]:
+                continue
+            vector, steps = np.array(values) * unit, np.diag(half_units(p.linkage))
+            found, *changed = (
+                p.linkage_error(Linkage.from_vector(x, 1)) for x in (vector, *(vector + steps), *(vector - steps))
+            )
+            if np.isfinite(found):
+                reach = 0.5 * float(np.abs(np.subtract(*np.split(np.array(changed), 2))).sum())
+                assert abs(found - p.error) > tolerance + reach, (k, values[k], found)
+
+
+def test_another_digit_may_give_the_stated_error_of_the_bounded_ellipse() -> None:
+    """With l4 = 22.6 cm instead of 22.0 cm the error is 53.70 cm2, and 53.6 cm2 within the rounding."""
+    p = PROBLEMS["ellipse-a-bounded"]
+    found = [p.linkage_error(replace(p.linkage, rocker_length=length)) for length in (0.2255, 0.226, 0.2265)]
+    assert found == sorted(found)
+    assert found[1] == pytest.approx(53.70, abs=5e-3)
+    assert found[0] < p.error < found[2]
 
 
 def test_half_units_of_printed_digits() -> None:

@@ -349,8 +349,8 @@ def _step() -> tuple[Statement, ...]:
             "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
             why="the thesis prints only the Newton-Raphson half (eqs 7 to 26), and its program is missing. When we combine "
-            f"the two in our own way, the loop out of the plane stays open by {least:.0f} deg or more somewhere in the "
-            "turn",
+            f"the two in our own way, the loop stays open by {least:.0f} deg or more somewhere in the turn in each of the "
+            f"cases {', '.join(case.name for case in OPEN)}",
         ),
         Statement(
             "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "

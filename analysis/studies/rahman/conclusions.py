@@ -41,7 +41,8 @@ def _design() -> tuple[Statement, ...]:
             "all kinds of manufacturing tolerances, the results provide information needed for the sizing and "
             "dynamic balancing of a high speed slider crank in the design stage.",
             place,
-            "number of the dimensions a1, a2, a4, S1, alpha4 that section 3.1 varies. Then the greatest errors by the "
+            "number of the dimensions a1, a2, a4, S1, alpha4 that section 3.1 varies; *all kinds* is read as of all five. "
+            "Then the greatest errors by the "
             f"printed equations in the plane, a4 = 10 in, {FROM_DEAD}: of a joint force, relative to its greatest value; of "
             "the bearing force, relative to the greatest part of it that is due to inertia",
             f"none for a count; {ROUNDING}",

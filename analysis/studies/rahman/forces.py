@@ -253,8 +253,8 @@ def _momenta() -> tuple[Statement, ...]:
         Statement(
             "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
             text("section 2.8, eqs 52a, 53a, L744-748"),
-            f"difference from the binors times the velocities of eqs 36 and 32a, in a general position with g3 = {G3:g} in "
-            "for eq 53a and 0 for eq 52a (L1089)",
+            f"difference from the binors times the velocities of eqs 36 and 32a, in a general position with S1' = 1.3 in/s, "
+            f"and with g3 = {G3:g} in for eq 53a and 0 for eq 52a (L1089)",
             ROUNDING,
             (
                 unsure("eq 52a", "g3 for g2", difference(rod_52a, of_rod.momentum(moving[1])), "lb.s"),

@@ -407,8 +407,13 @@ def _torque_causes() -> list[Statement]:
         "position": position_torque(STIFFNESSES[0], STIFFNESSES[-1]),
         "damper": damper_torque(STIFFNESSES[-1]) - damper_torque(STIFFNESSES[0]),
     }
-    at = {f"{name} torque": round(place / (angle[1] - angle[0])) for name, place in places.items()}
-    shares = {part: {name: x[i] / whole[i] for name, i in at.items()} for part, x in differences.items()}
+    shares = {
+        part: {
+            f"{name} torque": float(np.interp(place, angle[:-1], x) / np.interp(place, angle[:-1], whole))
+            for name, place in places.items()
+        }
+        for part, x in differences.items()
+    }
     to_shaft = CM_PER_METRE * table_3_1(0.0).ground_length
     moved = np.ptp([_steady(k).slider_cm for k in STIFFNESSES], axis=0).max() / to_shaft
     difference = f"the difference of the torque between {_k(5e5)} and 2e6, at the extremes with {_k(1e6)}"
@@ -428,8 +433,9 @@ def _torque_causes() -> list[Statement]:
             "geometry which leads to changes in inertial loads.",
             text("3.2.1, L2005-2013"),
             "shares in the difference of the row before: of the inertial loads (all but the weight), and of the slider's "
-            "position alone (the mean of its effect when it is changed before its rates and after them). Then the greatest "
-            f"spread of u between the springs, relative to the {to_shaft:.2f} cm from start to shaft (our choice)",
+            "position alone, as we read *geometry* (the mean of its effects at the rates of the one spring and of the "
+            f"other). Then the greatest spread of u between the springs, relative to the {to_shaft:.2f} cm from start to "
+            "shaft (our choice)",
             f"{ALIKE:g}, the rule for *the same*, as *only* says; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
             (
                 *(

@@ -318,7 +318,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
     return (
         Statement(
             "The width of the region increases with increase of [sigma2].",
-            text("5.3.1, L3876; the same in L3938-3942"),
+            text("5.3.1, L3876; for crank and coupler again in L3938-3942"),
             "least growth of the width from one sigma2 to the next, from 0.01 to 0.1 in steps of 0.01; for the true periodic "
             "motion",
             SIGN,
@@ -383,7 +383,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     return (
         Statement(
             "The width of the region decreases with increase of [sigma3].",
-            text("5.3.1, L3892; the same in L3938-3942"),
+            text("5.3.1, L3892; for crank and coupler again in L3938-3942"),
             "greatest growth of the width from one sigma3 to the next, from 0.8 to 1.2 in steps of 0.025; for the true "
             "periodic motion",
             SIGN,

@@ -90,7 +90,7 @@ READING = (
     "or only those within the window; the window with both its ends or without. The plots have the window with both."
 )
 #: Reason why the stated error of a coupler curve does not belong to the printed linkage; see test_chapter_6.py.
-NO_DIGIT = "no rounding gives the stated value, nor does any other digit in a single place"
+NO_DIGIT = "no rounding gives the stated value, not even with another digit in a single place"
 
 
 def _ellipse_a() -> tuple[Statement, ...]:
@@ -152,12 +152,17 @@ def _bounded() -> tuple[Statement, ...]:
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
             f"sum of the squared distances of the printed linkage at {N} crank angles, with alpha1 = -93.8 deg (erratum 11), "
-            f"{ROUNDED}; increase over the error of Fig 6.4, rounded likewise",
+            f"{ROUNDED}; increase over the error of Fig 6.4, whose numbers are changed likewise",
             HALF,
             (
-                judge_stated_error("error", "53.6", "ellipse-a-bounded", NO_DIGIT),
+                judge_stated_error(
+                    "error",
+                    "53.6",
+                    "ellipse-a-bounded",
+                    "no rounding gives the stated value, unless there is another digit in a single place, such as l4 = 22.6 cm",
+                ),
                 near(
-                    f"increase; rounded up or down {increases[0]:.2f} to {increases[1]:.2f}",
+                    f"increase; rounding allows {increases[0]:.2f} to {increases[1]:.2f}",
                     "52.7",
                     np.clip(52.7, *increases),
                     unit="cm2",
@@ -174,8 +179,8 @@ def _rocker() -> tuple[Statement, ...]:
             "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
             "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
             text("6.4.2 B, L4965"),
-            "error of the printed linkages, with each printed number rounded up or down, by that of the readings above that "
-            "comes nearest to the stated error",
+            "error of the printed linkages, with each printed number changed by at most half a unit of its last digit, by that "
+            "of the readings above that comes nearest to the stated error",
             HALF,
             (
                 judge_stated_error("unweighted", "700.0", "rocker"),

@@ -259,8 +259,8 @@ def _rocker() -> tuple[Statement, ...]:
             text("7.3.2, L5965"),
             f"least error over the readings of the printed series, with the weighted errors at {angles} crank angles added up "
             "and divided by 1000. The readings differ in its sign, that of its sines and of v; in A0, which is whole, a tenth "
-            "or none; and in the argument, omega t or theta2. Each number of links and series is rounded up or down so that "
-            "the error comes nearest to the stated one",
+            "or none; and in the argument, omega t or theta2. Each number of links and series is changed by at most half a "
+            "unit of its last digit, so that the error comes nearest to the stated one",
             "0.05 deg2, half a unit of the last digit",
             (near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),),
             "by the other readings of the angles and weights at Fig 6.7, where the 35.0 is judged, the error is "
@@ -343,7 +343,7 @@ def shares_of_stated() -> dict[str, float]:
 
 
 def error_range(name: str, found: Linkage) -> tuple[float, float]:
-    """Return the least and the greatest error with a printed series if each printed number is rounded up or down.
+    """Return the least and the greatest error with a printed series over the rounding of the printed numbers.
 
     ``found`` is the linkage with this series.
     """

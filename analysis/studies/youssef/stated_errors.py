@@ -19,7 +19,8 @@ FloatArray = NDArray[np.float64]
 
 #: How a printed linkage is rounded before its error is judged.
 ROUNDED = (
-    "with each printed number of the linkage rounded up or down so that the result comes nearest to the stated one"
+    "with each printed number of the linkage changed by at most half a unit of its last digit, so that the result comes "
+    "nearest to the stated one"
 )
 #: Numbers of crank angles, in steps of whole or half degrees, that the errors of the rocker functions may refer to.
 NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
@@ -102,7 +103,7 @@ def judge_stated_error(label: str, stated: str, name: str, why: str = "no roundi
     """Judge whether a stated error lies in the range of `rounding_range`."""
     reading, least, greatest = rounding_range(name)
     return near(
-        f"{label}{reading}; rounded up or down {least:.2f} to {greatest:.2f}",
+        f"{label}{reading}; rounding allows {least:.2f} to {greatest:.2f}",
         stated,
         np.clip(float(stated), least, greatest),
         unit=PROBLEMS[name].unit,
