@@ -226,20 +226,6 @@ def test_what_is_not_finite_is_reported_for_all_directions_of_a_number() -> None
     assert np.isnan(x).tolist() == [False, True, True]
 
 
-def test_length_and_elements() -> None:
-    x = Dual(np.arange(6.0).reshape(2, 3), np.arange(12.0).reshape(2, 2, 3))
-    assert len(x) == 2
-    assert [row.shape for row in x] == [(3,), (3,)]
-    assert np.shape(x) == (2, 3)
-    assert Dual(0.5)
-    assert not Dual(0.0, 1.0)
-    with pytest.raises(TypeError):
-        len(Dual(1.0))
-    for function in (np.mean, np.sum, np.concatenate):
-        with pytest.raises(TypeError):
-            function(x)
-
-
 # ------------------------------------------------------------------ the plant's own functions
 
 
@@ -337,14 +323,3 @@ def test_products_do_not_depend_on_the_frame(seed: int) -> None:
     same(apply(skew(a), b), cross(a, b))
     same(axial(skew(a)), a)
     same(cross(a, b), -cross(b, a))
-
-
-def test_stack_and_join() -> None:
-    x, y = Dual([1.0, 2.0], [3.0, 4.0]), 5.0
-    both = stack([x, y])
-    np.testing.assert_array_equal(both.real, [[1.0, 5.0], [2.0, 5.0]])
-    np.testing.assert_array_equal(both.dual, [[3.0, 0.0], [4.0, 0.0]])
-    assert join(both, both).shape == (2, 4)
-    assert stack([both, both], axis=-2).shape == (2, 2, 2)
-    assert both.T.shape == (2, 2)
-    assert "Dual" in repr(x)

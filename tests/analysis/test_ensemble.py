@@ -93,13 +93,6 @@ def test_speed_drives_with_jumps_of_differing_numbers() -> None:
         assert_same(many, i, parameters=TABLE_3_1, inputs=inputs[i], **OPTIONS)
 
 
-def test_one_set_of_inputs_serves_all() -> None:
-    many = simulate_many(SPRINGS[:2], Inputs(speed=SPEED), initial=InitialState(crank_angle=0.3), **OPTIONS)
-    for i in range(2):
-        initial = InitialState(crank_angle=0.3)
-        assert_same(many, i, parameters=SPRINGS[i], inputs=Inputs(speed=SPEED), initial=initial, **OPTIONS)
-
-
 def test_functions_are_shared() -> None:
     brake = Function(lambda t, th2, u, w2, v: -0.02 * w2)
     inputs = [Inputs(torque=(TorsionBar(torque=torque), brake)) for torque in (5.0, 10.0)]
@@ -266,14 +259,6 @@ def test_input_that_ceases_to_be_a_number_ends_its_run_alone() -> None:
     assert many.status.tolist() == [2, 0]
     assert many.messages[0].startswith("the input force is not a finite number at t = 0.0193")
     assert 0 < many.counts[0] < many.counts[1] == 11
-
-
-def test_two_jobs_give_what_one_does() -> None:
-    brake = Function(lambda t, th2, u, w2, v: -2.0 * v)
-    inputs = [Inputs(torque=torque, force=brake) for torque in TORQUES]
-    one = simulate_many(SPRINGS, inputs, batch=4, **OPTIONS)
-    two = simulate_many(SPRINGS, inputs, batch=4, n_jobs=2, **OPTIONS)
-    assert same(one, two)
 
 
 def same(a: Ensemble, b: Ensemble) -> bool:

@@ -175,27 +175,6 @@ def test_jump_of_the_right_hand_side_starts_anew() -> None:
     assert solver.y[0] == pytest.approx(pi * np.exp(-50.0 * (4.0 - pi)), abs=1e-6)
 
 
-def test_first_step_that_is_too_long_is_cut() -> None:
-    result = solve_ivp(pendulum, (0.0, 10.0), START, method=Hamming, first_step=10.0, rtol=1e-8, atol=1e-8)
-    assert np.abs(result.y[:, -1] - EXACT_10).max() < 1e-6
-
-
-def test_longest_step_is_kept_to() -> None:
-    result = solve_ivp(pendulum, (0.0, 10.0), START, method=Hamming, max_step=0.03, rtol=1e-3, atol=1e-3)
-    assert np.diff(result.t).max() <= 0.03 * (1.0 + 1e-9)
-
-
-def test_tolerances_by_component() -> None:
-    def f(t: float, y: np.ndarray) -> list[float]:
-        return [-y[0], 1e6 * cos(5.0 * t)]
-
-    tight, loose = (
-        solve_ivp(f, (0.0, 3.0), [1.0, 0.0], method=Hamming, rtol=1e-6, atol=atol).nfev
-        for atol in ([1e-6, 1e-6], [1e-6, 1e6])
-    )
-    assert loose < tight
-
-
 # ------------------------------------------------------------------ manners of a SciPy method
 
 
@@ -216,36 +195,6 @@ def test_dense_output_is_as_good_as_the_steps(span: tuple[float, float]) -> None
     t = np.linspace(0.0, 10.0, 997)
     at_steps = np.abs(result.y - reference.sol(result.t)).max()
     assert np.abs(result.sol(t) - reference.sol(t)).max() < 1.5 * at_steps + 1e-12
-
-
-def test_events_and_recorded_times() -> None:
-    result = solve_ivp(
-        pendulum,
-        (0.0, 10.0),
-        START,
-        method=Hamming,
-        t_eval=np.linspace(0.0, 10.0, 11),
-        events=lambda t, y: y[0],
-        rtol=1e-9,
-        atol=1e-9,
-    )
-    assert result.t == pytest.approx(np.arange(11.0))
-    assert len(result.t_events[0]) >= 2
-    for t in result.t_events[0]:
-        assert abs(exact_at(t)[0]) < 1e-6
-
-
-def test_end_that_is_no_multiple_of_the_step() -> None:
-    result = solve_ivp(pendulum, (0.0, 0.97), START, method=Hamming, first_step=0.1, max_step=0.1, **LOOSE)
-    assert result.t[-1] == 0.97
-    assert result.y[:, -1] == pytest.approx(exact_at(0.97), abs=1e-5)
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
-def test_fewer_steps_than_it_takes_to_start(n: int) -> None:
-    result = fixed(pendulum, (0.0, 0.1), START, n)
-    assert len(result.t) == n + 1
-    assert result.y[:, -1] == pytest.approx(exact_at(0.1), abs=1e-7)
 
 
 def test_nothing_to_do() -> None:

@@ -71,11 +71,6 @@ def test_steps_belong_to_what_follows(t: float, left: bool, expected: float) -> 
     assert force(table([0.0, 0.5, 2.0], [1.0, -2.0, 7.0], "hold"), t, left=left) == expected
 
 
-def test_last_step_goes_on_for_ever() -> None:
-    assert force(steps([0.0, 0.5], [1.0, -2.0]), 1e9) == -2.0
-    assert force(steps([0.5], [3.0]), -1e9) == 3.0
-
-
 def test_linear_and_cubic_tables() -> None:
     t, y = np.array([0.0, 0.2, 0.3, 1.0]), np.array([1.0, -1.0, 4.0, 2.0])
     spline = CubicSpline(t, y)
@@ -93,14 +88,6 @@ def test_harmonics_and_their_rate() -> None:
     at = value(Inputs(speed=signal), 0.7)
     assert at["speed"] == pytest.approx(0.5 + 2.0 * cos(2.2) - cos(30.0), rel=1e-14)
     assert at["acceleration"] == pytest.approx(-6.0 * sin(2.2) + 40.0 * sin(30.0), rel=1e-14)
-
-
-@pytest.mark.parametrize("channel", ["torque", "speed", "force", "load_x", "load_y"])
-def test_harmonics_of_every_channel_go_where_they_belong(channel: str) -> None:
-    at = value(Inputs(**{channel: Harmonics(1.0, [2.0], [3.0], [0.0])}), 0.25)
-    assert at.pop(channel) == pytest.approx(1.0 + 2.0 * cos(0.75), rel=1e-14)
-    rates = {"speed": {"acceleration"}}
-    assert {name for name, v in at.items() if v} == rates.get(channel, set())
 
 
 @pytest.mark.parametrize(("th2", "expected"), [(0.0, 10.0), (0.5, 7.5), (1.5, 2.5), (-1.0, 15.0)])

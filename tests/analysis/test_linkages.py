@@ -29,7 +29,6 @@ from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.periodic import (
     Drive,
-    PeriodicOrbit,
     find_orbit,
     frequency_response,
     largest_multipliers,
@@ -295,7 +294,6 @@ SECTION = {"kind": "bar", "width": "20 mm", "thickness": "5 mm", "material": "st
 #: Wrong descriptions, and what the sentence must contain: the place, or the value with what would be right.
 MISTAKES = [
     ("bodies/crank/length", "-50 mm", "linkage.bodies.crank.length"),
-    ("bodies/crank/length", "50 kg", "linkage.bodies.crank.length"),
     ("bodies/crank/length", 1e308, "linkage.bodies.crank.length is 1e+308"),
     ("ground/D", [-1e308, 0], "linkage.ground.D[0] is -1e+308"),
     ("bodies/coupler/points", {"P": [0, 1e200]}, "linkage.bodies.coupler.points.P[1] is 1e+200"),
@@ -305,15 +303,12 @@ MISTAKES = [
     ("bodies/crank/length", None, "linkage.bodies.crank"),
     ("bodies/crank/lenght", "50 mm", "linkage.bodies.crank.length"),
     ("bodies/crank/bar", ["A"], "linkage.bodies.crank.bar"),
-    ("bodies/crank/bar", ["A", "B", "C"], "linkage.bodies.crank.bar"),
     ("bodies/crank/bar", ["A", "B 2"], "linkage.bodies.crank.bar"),
     ("bodies/crank/mass", "-1 kg", "linkage.bodies.crank.mass"),
     ("bodies/crank/mass", None, "linkage.bodies.crank"),
-    ("bodies/crank/mass", "1 m", "linkage.bodies.crank.mass"),
     ("bodies/crank/inertia", "1 kg", "linkage.bodies.crank.inertia"),
     ("bodies/crank/cog", ["1 mm"], "linkage.bodies.crank.cog"),
     ("bodies/crank/points", {"P": "1 mm"}, "linkage.bodies.crank.points.P"),
-    ("bodies/crank/points", {"P": ["1 mm", "2 N"]}, "linkage.bodies.crank.points.P"),
     ("bodies/crank/points", {"P_1": [0, 0]}, "P_1"),
     ("bodies/crank/section", {"kind": "rod"}, "linkage.bodies.crank.section"),
     ("bodies/crank/section", {"kind": "beam"}, "linkage.bodies.crank.section.kind"),
@@ -324,27 +319,21 @@ MISTAKES = [
     ("bodies", {}, "linkage.bodies is empty"),
     ("ground", None, "linkage.ground"),
     ("ground/A", [0], "linkage.ground.A"),
-    ("ground/A", "here", "linkage.ground.A"),
-    ("ground/A", ["1 s", 0], "linkage.ground.A"),
     ("name", None, "linkage.name"),
     ("nmae", "x", "linkage.name"),
     ("gravity", "-9.81 m/s^2", "linkage.gravity"),
-    ("gravity", "9.81 m", "linkage.gravity"),
     ("gravity_direction", "2 m", "linkage.gravity_direction"),
     ("loads", ["Q"], "linkage.loads"),
     ("loads", "C", "linkage.loads"),
     ("torques", ["gear"], "linkage.torques"),
     ("assembly", {"C": 2}, "linkage.assembly.C"),
-    ("assembly", {"C": "left"}, "linkage.assembly.C"),
     ("assembly", {"B": 1}, "linkage.assembly"),
     ("freedoms", {"a": "A", "d": "D"}, "linkage.freedoms has 2"),
     ("freedoms/crank/joint", "Z", "linkage.freedoms.crank"),
     ("freedoms/crank/start", "1 m", "linkage.freedoms.crank.start"),
-    ("freedoms/crank/speed", "1 m/s", "linkage.freedoms.crank.speed"),
     ("freedoms/crank/speed", "5 Hz", "linkage.freedoms.crank.speed"),
     ("freedoms/crank/start", 60, 'linkage.freedoms.crank.start is 60: it must be less than four turns, or a text'),
     ("springs/return", {"at": "D", "stiffness": 1.0, "free": 90.0}, "linkage.springs.return.free is 90.0"),
-    ("gears/Z", {"bodies": ["crank", "wheel"], "ratio": -0.5, "phase": -45}, "linkage.gears.Z.phase is -45"),
     ("freedoms/crank/driven", "yes", "linkage.freedoms.crank.driven"),
     ("freedoms/crank", 3, "linkage.freedoms.crank"),
     ("slides/G", {"body": "rocker", "through": "Z"}, "linkage.slides.G.through"),
@@ -352,9 +341,7 @@ MISTAKES = [
     ("slides/G", {"body": "ground", "through": "A"}, "linkage.slides.G.body"),
     ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
     ("slides/C", {"body": "rocker", "through": "A"}, "linkage.slides.C"),
-    ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
     ("slides/G", {"body": "rocker", "through": "A", "direction": 90}, 'direction is 90: it must be less than four turns'),
-    ("gravity_direction", -90.0, "linkage.gravity_direction is -90.0"),
     ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "rocker", "through": "B"}, "linkage.slots.S.through"),
@@ -376,7 +363,6 @@ MISTAKES = [
     ("springs/k", {"between": ["A", "Z"], "stiffness": 1.0}, "linkage.springs.k.between"),
     ("springs/k", {"between": ["A"], "stiffness": 1.0}, "linkage.springs.k.between"),
     ("springs/k", {"at": "C", "stiffness": -1.0}, "linkage.springs.k.stiffness"),
-    ("springs/k", {"at": "C", "damping": "-1 N*m*s/rad"}, "linkage.springs.k.damping"),
     ("springs/k", {"at": "C", "law": "import os"}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": "x.real"}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": "__import__('os')"}, "linkage.springs.k.law"),
@@ -411,13 +397,10 @@ MISTAKES = [
     ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
     ("ground", {}, "linkage.ground"),
     ("ground/A", [float("inf"), 0], "linkage.ground.A"),
-    ("name", "my linkage", "linkage.name"),
     ("name", "../x", "linkage.name"),
     ("name", "five-bar", "linkage.name"),
     ("loads", ["C", "C"], "linkage.loads has C twice"),
     ("loads", [{"point": "C", "frame": "link"}], "linkage.loads[0].frame"),
-    ("loads", [{"point": "C"}, "C"], "linkage.loads has C twice"),
-    ("torques", ["rocker", "rocker"], "linkage.torques has rocker twice"),
     ("freedoms", ["A"], "linkage.freedoms"),
     ("freedoms", {"coupler": "A"}, "linkage.freedoms.coupler"),
     ("freedoms", {"crank 1": "A"}, "linkage.freedoms.crank 1"),
@@ -427,7 +410,6 @@ MISTAKES = [
     ("gears/X", {"bodies": ["crank", "crank"], "ratio": -1}, "linkage.gears.X.bodies"),
     ("gears/X", {"bodies": ["crank", "coupler"], "ratio": -1}, "linkage.gears.X.bodies"),
     ("gears/X", {"bodies": ["crank", "rocker"], "ratio": 0}, "linkage.gears.X.ratio"),
-    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": "1:2"}, "linkage.gears.X.ratio"),
     ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0}, "linkage.racks.R.radius"),
     ("springs/k", {"at": "C"}, "linkage.springs.k does nothing"),
     ("springs/k", {"at": "C", "stiffness": 1.0, "free": "1 mm"}, "linkage.springs.k.free is"),
@@ -442,7 +424,6 @@ MISTAKES = [
         "linkage.springs.k.free is -150 deg, and the angle at",
     ),
     ("gears/C", {"bodies": ["crank", "rocker"], "ratio": -1}, "linkage.gears.C has the name of a point"),
-    ("slides/B", {"body": "rocker", "through": "A"}, "linkage.slides.B has the name of a point"),
     ("springs/energy", {"at": "D", "stiffness": 1.0}, "linkage.springs.energy has a name that is taken"),
     ("bodies/rocker/section", {"kind": "tube", "outer": "5 mm", "inner": "6 mm", "material": "steel"},
      "linkage.bodies.rocker.section.inner is 0.006"),
@@ -999,18 +980,6 @@ def test_the_greatest_force_of_a_stop_is_found_between_the_samples() -> None:
     assert value == pytest.approx(run["stop.exerted_force"].max(), rel=1e-4)
 
 
-def test_rounding_errors_of_a_motion_nearly_at_rest_take_no_more_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    known, found = striker(2e7).first_set.parameters, PeriodicOrbit.turn
-    orbit, noise = newton_orbit(variant(known, rotor_mass=1e-9), Drive(speed=10.0 * math.pi)), np.random.default_rng(1)
-
-    def turn(self: PeriodicOrbit, samples: int = 256) -> Any:
-        made = found(self, samples)
-        return replace(made, values=made.values + 1e-14 * noise.normal(size=made.values.shape))
-
-    monkeypatch.setattr(PeriodicOrbit, "turn", turn)
-    assert len(orbit.resolved_turn(["x.position"]).angle) == 256
-
-
 def test_the_amplitude_of_a_flywheel_that_a_press_slows_down_suddenly() -> None:
     built = linkage("pressing", ground={"A": (0, 0)}).body("wheel", points={"A": (0, 0)}, mass=30, inertia=12)
     built.spring("load", at="A", law="20*v - 250 + 40*sin(x) + 3e4*max(sin(x) - 0.98, 0)")
@@ -1168,15 +1137,6 @@ def held() -> Any:
     return built.body("tip", bar=("B", "C"), length=0.1, mass=1.0).body("end", bar=("C", "D"), length=0.1, mass=1.0)
 
 
-def third_crank() -> Any:
-    """A parallelogram with a third crank, which is named, and not the coupler."""
-    built = linkage("third", ground={"A": (0, 0), "D": (0.15, 0), "E": (0.075, 0)})
-    for name, bar in (("a", ("A", "B")), ("d", ("D", "C")), ("e", ("E", "M"))):
-        built.body(name, bar=bar, length=0.05, mass=1.0)
-    coupler = {"B": (0, 0), "C": (0.15, 0), "M": (0.075, 0)}
-    return built.body("c", points=coupler, mass=1.0, inertia=1e-3).freedom("a", "A")
-
-
 def massless() -> Any:
     """A massless body, which is blamed, and not the sound law beside it."""
     built = linkage("massless", ground={"A": (0, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0, inertia=1e-3)
@@ -1242,7 +1202,6 @@ def test_a_clockwise_torsion_bar_is_the_mirror_of_a_counterclockwise_one() -> No
 #: Linkages that are refused, and the sentence; those that are one entry of the four-bar are among `MISTAKES`.
 REFUSED = [
     (held, r"linkage\.bodies\.block is joined to ground twice, by one and by two"),
-    (third_crank, r"without linkage\.bodies\.e it has 1"),
     (massless, r"numbers: change the mass or inertia of linkage\.bodies\.pendulum"),
     (short_slot, r"linkage\.slots\.S"),
     (lambda: crowded("Q"), "at the pin Q of drum, pendulum, bob: it must be at a joint of two bodies"),

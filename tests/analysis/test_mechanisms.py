@@ -354,7 +354,7 @@ FAULTS: dict[str, tuple[str, Any, str]] = {
     "status": ("variables", swapped(ROTOR, "solver.status", causality="output"), "'output': it must be local"),
     "rate of nothing": ("variables", swapped(ROTOR, "cart.acceleration", rate_of="cart.speed"), "rate of 'cart.speed'"),
     "rate of a freedom": ("variables", swapped(ROTOR, "cart.velocity", rate_of=""), "must be that of cart.position"),
-    "depends": ("variables", swapped(ROTOR, "cart.position", depends="stat"), "depends on 'stat'"),
+    "depends": ("variables", swapped(ROTOR, "cart.position", depends="stat"), "has the depends 'stat'"),
     "output left out": (
         "variables",
         tuple(v for v in ROTOR.variables if v.name != "drive.applied_torque"),

@@ -154,14 +154,6 @@ def test_commanded_shift_follows_its_speed() -> None:
     assert result["shift.acceleration"] == pytest.approx(-1.5 * np.sin(5.0 * t), abs=1e-12)
 
 
-def test_commanded_shift_as_a_function_is_the_same_as_its_harmonics() -> None:
-    wave = Function(lambda t, th, s, w, v: 0.3 * cos(5.0 * t), rate=lambda t, th, s, w, v: -1.5 * sin(5.0 * t))
-    options: dict[str, Any] = {"initial": INITIAL, "stop_time": 1.0, "step": 0.05, "tolerance": 1e-10}
-    one = simulate(PARAMETERS, Inputs(speed=SPEED, shift_speed=wave), **options)
-    other = Inputs(speed=SPEED, shift_speed=Harmonics(0.0, [0.3], [5.0], [0.0]))
-    assert compare(one, simulate(PARAMETERS, other, **options), tolerance=1e-8).agrees
-
-
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
 def test_jump_of_the_axial_speed_moves_the_free_crank(method: str) -> None:
     # the generalised momentum of the crank, m11 w + m12 v, is conserved across the jump
