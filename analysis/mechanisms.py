@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from functools import lru_cache
 from types import MappingProxyType
@@ -61,17 +61,16 @@ def register(mechanism: Mechanism) -> None:
 def _faults_of_interface(m: Mechanism) -> Iterator[str]:
     names = [v.name for v in m.variables]
     for v in m.variables:
-        known = ("local",) if v.name in STATUS_NAMES else ("parameter", "input", "output")
-        if v.causality not in known:
-            yield f"{v.name} has the causality {v.causality!r}: it must be {' or '.join(known)}"
+        for field, known in (
+            ("causality", ("local",) if v.name in STATUS_NAMES else ("parameter", "input", "output")),
+            ("unit", UNITS if v.kind == "Real" else (v.unit,)),
+            ("depends", ("state", "speed", "all")),
+            ("level", ("position", "velocity", "all", "none")),
+        ):
+            if getattr(v, field) not in known:
+                yield f"{v.name} has the {field} {getattr(v, field)!r}: it must be {' or '.join(known)}"
         if v.rate_of and not {v.name, v.rate_of} <= set(m.output_names):
             yield f"{v.name} is the rate of {v.rate_of!r}: both must be real outputs"
-        if v.kind == "Real" and v.unit not in UNITS:
-            yield f"{v.name} has the unit {v.unit!r}: it must be one of {', '.join(UNITS)}"
-        if v.depends not in ("state", "speed", "all"):
-            yield f"{v.name} depends on {v.depends!r}: it must be state, speed or all"
-        if v.level not in ("position", "velocity", "all", "none"):
-            yield f"{v.name} has the level {v.level!r}: it must be position, velocity, all or none"
     for v in m.variables:
         if v.role and ROLES.get(v.role, ("",))[0] != v.causality:
             yield f"{v.name}, a {v.causality}, has the role {v.role!r}: the roles are {', '.join(ROLES)}"
@@ -181,25 +180,30 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
             yield f"its picture has no joint {name!r}"
 
 
-class _PublishedSets(Mapping[str, Any]):
+class OfAll(Mapping[str, Any]):
+    """What all known mechanisms have, by name: ``own`` returns what one mechanism has."""
+
+    def __init__(self, what: str, own: Callable[[Mechanism], Mapping[str, Any]]) -> None:
+        self._what, self._own = what, own
+
+    def _all(self) -> dict[str, Any]:
+        return {name: item for mechanism in MECHANISMS.values() for name, item in self._own(mechanism).items()}
+
     def __repr__(self) -> str:
-        return f"<published sets: {', '.join(self)}>"
+        return f"<{self._what}: {', '.join(self)}>"
 
     def __getitem__(self, name: str) -> Any:
-        for mechanism in MECHANISMS.values():
-            if name in mechanism.published:
-                return mechanism.published[name]
-        raise KeyError(name)
+        return self._all()[name]
 
     def __iter__(self) -> Iterator[str]:
-        return (name for mechanism in MECHANISMS.values() for name in mechanism.published)
+        return iter(self._all())
 
     def __len__(self) -> int:
-        return sum(len(mechanism.published) for mechanism in MECHANISMS.values())
+        return len(self._all())
 
 
 #: The published sets of every mechanism, by name: each has parameters, initial, drive and source.
-PUBLISHED: Mapping[str, Any] = _PublishedSets()
+PUBLISHED: Mapping[str, Any] = OfAll("published sets", lambda mechanism: mechanism.published)
 
 #: Parameters of a mechanism and its state at the start: instances of `Mechanism.parameters` and `Mechanism.initial`.
 Parameters = Any
@@ -269,18 +273,12 @@ def variable_unit(mechanism: Mechanism, name: str) -> str:
 
 def variable_units() -> dict[str, str]:
     """Return the unit of every real variable of every mechanism, by its FMI name."""
-    # cached, as every new `Drive` calls this
-    here = list(map(id, MECHANISMS.values()))
-    if here != list(map(id, _units_of)):
-        _units_of[:] = MECHANISMS.values()
-        _units.clear()
-        _units.update((v.name, v.unit) for mechanism in _units_of for v in mechanism.variables if v.kind == "Real")
-    return _units
+    return _real_units(tuple(MECHANISMS.values()))
 
 
-#: Result of `variable_units`, and the mechanisms for which it was computed.
-_units: dict[str, str] = {}
-_units_of: list[Mechanism] = []
+@lru_cache(maxsize=4)  # as every new `Drive` asks for them
+def _real_units(mechanisms: tuple[Mechanism, ...]) -> dict[str, str]:
+    return {v.name: v.unit for mechanism in mechanisms for v in mechanism.variables if v.kind == "Real"}
 
 
 for _mechanism in (FIVE_BAR, SLIDER_CRANK):

@@ -283,7 +283,7 @@ def linkage_pictures() -> Iterator[Picture]:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "four-bar.toml"
-        path.write_text(TEXT.format(file=path.name), encoding="utf-8")
+        path.write_text(TEXT.replace("{file}", path.name), encoding="utf-8")
         yield "four-bar", plot(load_linkage(path)), 90
         page = (HERE / "linkages.md").read_text(encoding="utf-8")
         motor = path.with_name("motor.toml")

@@ -83,7 +83,7 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
     if kind == LINKAGE:
         from ..linkages import TEXT
 
-        return TEXT.format(file=file)
+        return TEXT.replace("{file}", file)
     if kind in MECHANISMS:
         mechanism = MECHANISMS[kind]
         command = f"linkwork {kind if kind == 'slider-crank' else ''} info".replace("  ", " ")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -105,9 +105,7 @@ def _check_text(path: Path, name: str, text: str, longest: int) -> None:
         raise InputError(f"{path}: {name} has half a character: \\ud800 to \\udfff come in pairs")
 
 
-def override(
-    data: Mapping[str, Any], overrides: Mapping[str, Any], *, exclusive: Collection[str] = ()
-) -> dict[str, Any]:
+def override(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Return a copy of nested tables with single values replaced.
 
     Parameters
@@ -115,8 +113,6 @@ def override(
     data : mapping
     overrides : mapping
         New values by dotted name, such as ``slider.stiffness``; the names may have any number of parts.
-    exclusive : collection of str, optional
-        Names of tables that hold only one entry: setting an entry removes the entry that was there.
 
     Raises
     ------
@@ -128,11 +124,8 @@ def override(
         *groups, leaf = name.split(".")
         place = result
         for depth, group in enumerate(groups, start=1):
-            inner = dict(as_table(place.get(group, {}), ".".join(groups[:depth])))
-            if depth == 1 and group in exclusive:
-                inner = {key: v for key, v in inner.items() if key == name.split(".")[1]}
-            place[group] = inner
-            place = inner
+            place[group] = dict(as_table(place.get(group, {}), ".".join(groups[:depth])))
+            place = place[group]
         place[leaf] = value
     return result
 

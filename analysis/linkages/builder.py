@@ -84,7 +84,7 @@ def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
             )
         tables = files.read_tables(path)
         if not has_linkage(tables):
-            raise _no_linkage_error(path)
+            raise InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
         found.append((path, tables))
         if not isinstance(tables[LINKAGE], str):
             return found
@@ -111,10 +111,6 @@ def _merge_tables(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bo
         if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
             merged[name] = _merge_tables(below, table, top=False)
     return merged
-
-
-def _no_linkage_error(path: str | Path) -> InputError:
-    return InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
 
 
 def _package(tables: Mapping[str, Any]) -> Package:

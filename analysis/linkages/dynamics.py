@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from linkwork.friction import FRICTION_FORCE
 
-from .description import BODY, GROUND, Description, Spring, is_given
+from .description import BODY, GROUND, Spring, is_given
 from .equations import Twist
 from .laws import expression, with_constants
 from .parameters import Interface, length_and_mass
@@ -25,19 +25,15 @@ class Reaction(NamedTuple):
     on: str
 
 
-def springs_by_freedom(description: Description, interface: Interface) -> dict[str, int]:
-    """Return, for each spring that acts along a freedom, the index of this freedom, by the name of the spring."""
-    numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
-    return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
-
-
 class Motion:
     """Writer of the functions that compute forces and motion of one linkage."""
 
     def __init__(self, interface: Interface, counted: Mapping[str, Twist]) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
-        self.along = springs_by_freedom(self.description, interface)
+        numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
+        #: index of the freedom along which a spring acts
+        self.along = {name: numbers[s.at] for name, s in self.description.springs.items() if s.at in numbers}
         self.counted, self.centred = counted, interface.centred_springs(counted)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
@@ -60,7 +56,8 @@ class Motion:
             free = f" - p.{name}_free" if is_given(spring.free) else ""
             stretch, rate = f"{name}_stretch", f"{name}_rate"
             if name in self.along:
-                suffix = f"{free}_{self._kind(spring)}" if free else ""
+                kind = "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
+                suffix = f"{free}_{kind}" if free else ""
                 rows.append(f"{stretch}, {rate} = x[{self.along[name]}]{suffix}, x[{self.n + self.along[name]}]")
             elif spring.between:
                 p, q = spring.between
@@ -89,9 +86,6 @@ class Motion:
         yield function(
             signature, "Compute the stretches of all springs.", [*rows, f"return Springs({', '.join(fields)})"]
         )
-
-    def _kind(self, spring: Spring) -> str:
-        return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
 
     def resistance(self, name: str, spring: Spring) -> str:
         """Return the expression of the force of a spring's damper, friction and force law; empty if it has none of these."""
@@ -328,19 +322,13 @@ class Motion:
             signature, "Return the loads and the commanded accelerations for values of the modes and the inputs.", rows
         )
 
-    def _commanded_rates(self) -> tuple[str, str]:
-        """Return the expressions of two tuples with an entry for each freedom.
-
-        The first entry is 1 if the rate is commanded, otherwise 0; the second is the commanded acceleration.
-        """
-        held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
-        known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
-        return f"({held},)", f"({known},)"
-
     def motion(self) -> Iterator[str]:
         """Write the functions for accelerations, state derivative, energies, speed jumps, initial state and clearance."""
         n, drives = range(self.n), self.interface.drives
-        held, known = self._commanded_rates()
+        # for each freedom 1 if the rate is commanded, otherwise 0; and the commanded acceleration
+        held, known = (
+            tuple_source(f"i.{d.name}_{field}" if d.table else "0.0" for d in drives) for field in ("held", "given")
+        )
         s = "s, " if self.description.springs else ""
         rows = ["b = places(x, p)", "m = masses(b, p)"]
         if s:

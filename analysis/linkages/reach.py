@@ -17,6 +17,9 @@ from .description import GROUND
 from .package import Package
 from .structure import Pin, Slider
 
+#: Number of positions tried on each side of the start: per half turn of an angle, in total of a displacement.
+_POSITIONS = 360
+
 
 class Reach(NamedTuple):
     """Range of a freedom about its start in which the linkage can be assembled, with the other freedoms at their start.
@@ -46,7 +49,7 @@ class Reach(NamedTuple):
     least: float
 
 
-def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, samples: int = 360) -> Reach:
+def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None) -> Reach:
     """Find the range in which the coordinate of a degree of freedom can move.
 
     Parameters
@@ -58,9 +61,6 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         Greatest distance from the start that is searched, for an angle that has a limit on one side alone twice as far on the
         other: by default half the period of the coordinate. If the coordinate is not periodic, the default is four turns for an
         angle, and five times the length of the linkage for a displacement.
-    samples : int
-        Number of positions tried on each side of the start: per half turn if the coordinate is an angle, in total if it is a
-        displacement.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = variable_unit(mechanism, coordinate)
@@ -70,7 +70,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     middle, length = x[freedom], mechanism.error_scale(known.parameters, tuple(x))[freedom]
     if most is None:
         most = 0.5 * period or (8.0 * pi if unit == "rad" else 5.0 * length)
-    samples *= max(round(most / pi), 1) if unit == "rad" else 1
+    samples = _POSITIONS * (max(round(most / pi), 1) if unit == "rad" else 1)
 
     def margin(q: float) -> float:
         """Return the clearance to the limit of assembly at a coordinate; below -1 if the bodies do not reach each other."""

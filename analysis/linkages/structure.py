@@ -326,7 +326,11 @@ def analyse(description: Description) -> Structure:
         raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}{hint}")
     _check_pairs(found)
     if not freedoms:
-        freedoms = _propose_freedoms(description, found, count)
+        # the first joints that will do, each freedom named after its joint's second body
+        some = next(_choices(description, found, count), ())
+        freedoms = {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
+        if not some:
+            raise LinkageError(f"{description.name} is not a chain of dyads, whatever joints are taken as freedoms")
     if len(freedoms) != count:
         raise LinkageError(
             f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): the two numbers must be equal"
@@ -382,13 +386,6 @@ def _choices(description: Description, found: Mapping[str, Joint], count: int) -
     return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])
 
 
-def _propose_freedoms(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
-    """Return the first set of freedoms that determines the poses of all bodies, each named after its joint's second body."""
-    for some in _choices(description, found, count):
-        return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
-    raise LinkageError(f"{description.name} is not a chain of dyads, whatever joints are taken as freedoms")
-
-
 def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[FreedomStep]:
     """Return the steps that place the bodies that freedoms connect to the body ``root``, each step after that of its parent."""
     steps: list[FreedomStep] = []
@@ -408,9 +405,10 @@ def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed
 
 def _solve(description: Description, found: Mapping[str, Joint], freed: list[str]) -> tuple[list[Step], list[str]]:
     """Return the steps of the solution, and the undetermined bodies; ``freed`` has the names of the joints of freedoms."""
-    steps: list[Step] = list(_tree(GROUND, found, freed))
+    tree = _tree(GROUND, found, freed)
+    steps: list[Step] = [*tree]
     #: bodies whose poses are known, in order; bodies whose angles, and slides whose positions, are linear in the coordinates
-    known = dict.fromkeys((GROUND, *(step.body for step in _freedom_steps(steps))))
+    known = dict.fromkeys((GROUND, *(step.body for step in tree)))
     linear, travels = set(known), set(freed)
     moving = [*description.bodies, *description.slots]
     fixed = [joint for name, joint in found.items() if name not in freed]
@@ -464,10 +462,6 @@ def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[FreedomStep]], known
             there |= dict.fromkeys(inner.bodies)
         groups[body] = own
     return next(_dyads(fixed, groups, known), None)
-
-
-def _freedom_steps(steps: list[Step]) -> Iterator[FreedomStep]:
-    return (step for step in steps if isinstance(step, FreedomStep))
 
 
 def _gear_steps(

@@ -34,20 +34,17 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Line:
-    """Roots of a test function along a line, and the intervals on which the function is negative.
+    """Roots of a test function along a line.
 
     Attributes
     ----------
     roots : ndarray, shape (n,)
         Zeros of the test function, increasing.
-    intervals : tuple of (float, float)
-        Intervals on which the test function is negative; they may end at an end of the line or at a gap.
     gaps : tuple of (float, str)
         Places at which the test function has no value, each with the reason.
     """
 
     roots: NDArray[np.float64]
-    intervals: tuple[tuple[float, float], ...]
     gaps: tuple[tuple[float, str], ...]
 
 
@@ -77,37 +74,17 @@ def scan(
     """
     points, values, gaps = _sample_function(function, _samples(low, high, samples))
     roots: list[float] = []
-    intervals: list[tuple[float, float]] = []
-    begun = points[0] if values[0] < 0.0 else None
-
-    def end(place: float) -> None:
-        nonlocal begun
-        if begun is not None:
-            intervals.append((begun, place))
-        begun = None
-
     for (here, value), (there, following) in pairwise(zip(points, values)):
-        if isnan(following):
-            end(here)
-        elif isnan(value):
-            begun = there if following < 0.0 else None
-        elif (value < 0.0) != (following < 0.0):
-            # a function value of zero counts as positive: the same root is not found from both sides
+        # a function value of zero counts as positive: the same root is not found from both sides
+        if not (isnan(value) or isnan(following)) and (value < 0.0) != (following < 0.0):
             try:
-                root = there
-                if following != 0.0:
-                    root = float(scipy.optimize.brentq(function, here, there, xtol=tolerance * (high - low)))
+                found = (
+                    scipy.optimize.brentq(function, here, there, xtol=tolerance * (high - low)) if following else there
+                )
+                roots.append(float(found))
             except LinkworkError as error:
                 gaps.append((there, f"just before: {error}"))
-                # the boundary is somewhere between the samples, and so is the end of the interval
-                end(here)
-                root = there
-            else:
-                roots.append(root)
-                end(root)
-            begun = root if following < 0.0 else None
-    end(points[-1])
-    return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+    return Line(roots=np.array(roots), gaps=tuple(gaps))
 
 
 def _sample_function(
@@ -388,7 +365,7 @@ class Chart:
     gaps: tuple[Gap, ...]
 
     def scan_line(self, y: float, *, samples: int = 200) -> Line:
-        """Scan the line of constant ``y`` for its crossings with boundaries and its intervals of instability."""
+        """Scan the line of constant ``y`` for its crossings with boundaries."""
         return scan(lambda x: self.test(x, y), *self.box.x, samples=samples)
 
 

@@ -43,6 +43,7 @@ from linkwork.errors import LinkworkError
 from . import lanes as vectors
 from . import linking
 from .cache import code_folder, load_or_make, lock_folder, store_file
+from .symbolic import ELEMENTARY, library
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -129,32 +130,14 @@ def own_source() -> bytes:
 
 
 #: Functions of the C library by CasADi's operations.
-_FUNCTIONS = {
-    "OP_SIN": "sin",
-    "OP_COS": "cos",
-    "OP_TAN": "tan",
-    "OP_ASIN": "asin",
-    "OP_ACOS": "acos",
-    "OP_ATAN": "atan",
-    "OP_ATAN2": "atan2",
-    "OP_SINH": "sinh",
-    "OP_COSH": "cosh",
-    "OP_TANH": "tanh",
-    "OP_EXP": "exp",
-    "OP_LOG": "log",
-    "OP_POW": "pow",
-    "OP_CONSTPOW": "pow",
-    "OP_HYPOT": "hypot",
-    "OP_SQRT": "sqrt",
-    "OP_FABS": "fabs",
-}
+_FUNCTIONS = {f"OP_{name.upper()}": name for name in ELEMENTARY} | {"OP_CONSTPOW": "pow"}
 _INTRINSICS = {"sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64"}
 
 
 @cache
 def _operations() -> dict[int, str]:
     """Return the names of CasADi's operations by code."""
-    casadi = _casadi()
+    casadi = library()
     return {getattr(casadi, name): name for name in dir(casadi) if name.startswith("OP_")}
 
 
@@ -220,7 +203,7 @@ class Writer:
         if any(f.nnz_out(i) != size for i, size in enumerate(sizes)):
             raise LinkworkError(f"{f.name()}: an output has structural zeros; make it dense with casadi.densify")
         first = np.cumsum([0, *sizes])
-        casadi = _casadi()
+        casadi = library()
         values: dict[int, Any] = {}
         for k in range(f.n_instructions()):
             code, ins, outs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
@@ -297,12 +280,6 @@ class Writer:
 
 def _index(place: int) -> Any:
     return ir.Constant(ir.IntType(32), place)
-
-
-def _casadi() -> Any:
-    from .symbolic import library
-
-    return library()
 
 
 # Calls from kernels

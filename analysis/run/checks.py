@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
-from ..mechanisms import MECHANISMS
+from ..mechanisms import OfAll
 from .case_files import Case, published_case, read_case
 from .cosimulation import Comparison, compare, cosimulate
 from .simulation import simulate
@@ -29,24 +29,8 @@ def standard_cases(mechanism: Mechanism) -> Mapping[str, Case]:
     return {name: read_case(tables, folder=Path()) for name, tables in mechanism.cases.items()}
 
 
-class _Cases(Mapping[str, Case]):
-    """The standard cases of all known mechanisms, by name."""
-
-    def _all(self) -> dict[str, Case]:
-        return {name: case for m in MECHANISMS.values() for name, case in standard_cases(m).items()}
-
-    def __getitem__(self, name: str) -> Case:
-        return self._all()[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._all())
-
-    def __len__(self) -> int:
-        return len(self._all())
-
-
 #: Standard cases by name; they cover all ways of driving and loading the mechanisms.
-CASES: Mapping[str, Case] = _Cases()
+CASES: Mapping[str, Case] = OfAll("standard cases", standard_cases)
 
 
 def check(

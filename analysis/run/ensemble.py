@@ -7,7 +7,7 @@ import mmap
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from math import prod
@@ -287,54 +287,56 @@ def simulate_many(
         )
         for k in range(0, len(parameters), batch)
     ]
-    gathered = _EnsembleArrays(parameters, mechanism, settings.times, names, outputs is not None, where)
-    gathered.modes[:] = list(encoded.modes.values())
-    into = gathered.samples() if where is None and share_memory(n_jobs, threads=True) else None
+    m = len(parameters)
+    empty = Ensemble(
+        time=settings.times,
+        states=np.empty((m, 0, mechanism.size)),
+        forces=np.empty((m, 0, len(mechanism.channels))),
+        values=None,
+        names=names,
+        status=np.full(m, NOT_RUN),
+        messages=(),
+        counts=np.zeros(m, dtype=np.int64),
+        parameters=parameters if isinstance(parameters, VariedSequence) else tuple(parameters),
+        modes=np.array(list(encoded.modes.values()), dtype=float),
+        energies=np.full(m, np.nan),
+    )
+    gathered = _Gathering(where, mechanism, outputs is not None, empty)
+    into = gathered.samples if where is None and share_memory(n_jobs, threads=True) else None
     with (
         record_interrupts() as interrupts,
-        show_progress(options.get("progress", False), float(len(parameters))) as show,
+        show_progress(options.get("progress", False), float(m)) as show,
     ):
         try:
             work = partial(solve, interrupts=interrupts, into=into)
             for _, result in run_in_parallel(work, tasks, interrupts, n_jobs=n_jobs, threads=True):
                 if result is not None:
                     gathered.add(result)
-                    show(float(np.count_nonzero(gathered.status != NOT_RUN)))
+                    show(float(gathered.done))
         except WorkersLost as error:
             raise EnsembleBroken(gathered.ensemble(), where, error) from error
-    if interrupts and np.any(gathered.status == NOT_RUN):
+    if interrupts and gathered.done < m:
         raise EnsembleInterrupted(gathered.ensemble(), where)
     return gathered.ensemble()
 
 
-class _EnsembleArrays:
-    """The arrays of an ensemble, allocated once and filled with the results of batches as these arrive."""
+class _Gathering:
+    """An ensemble whose arrays are allocated once, and filled with the results of batches as these arrive.
 
-    def __init__(
-        self,
-        parameters: Sequence[Parameters],
-        mechanism: Mechanism,
-        times: NDArray[np.float64],
-        names: tuple[str, ...],
-        chosen: bool,
-        folder: Path | None,
-    ) -> None:
-        m, n = len(parameters), len(times)
-        self.parameters = parameters if isinstance(parameters, VariedSequence) else tuple(parameters)
-        self.times, self.names, self.chosen = times, names, chosen
-        samples = 0 if chosen else n
+    With a folder the arrays are mapped to unnamed files there, so that they take little memory.
+    """
+
+    def __init__(self, folder: Path | None, mechanism: Mechanism, chosen: bool, empty: Ensemble) -> None:
+        m, n = empty.status.size, len(empty.time)
+        sizes = (len(empty.names),) if chosen else (mechanism.size, len(mechanism.channels))
         self.maps: list[mmap.mmap] = []
-        self.states = self._allocate((m, samples, mechanism.size), folder)
-        self.forces = self._allocate((m, samples, len(mechanism.channels)), folder)
-        self.values = self._allocate((m, n, len(names)), folder) if chosen else None
-        self.status = np.full(m, NOT_RUN)
+        #: what batches fill: states and channels, or the chosen outputs
+        self.samples = [self._allocate((m, n, size), folder) for size in sizes]
         self.messages = ["not run: interrupted"] * m
-        self.counts = np.zeros(m, dtype=np.int64)
-        self.energies = np.full(m, np.nan)
-        self.modes = np.zeros(len(mechanism.modes))
+        arrays: dict[str, Any] = dict(zip(("values",) if chosen else ("states", "forces"), self.samples))
+        self._empty = replace(empty, **arrays)
 
     def _allocate(self, shape: tuple[int, ...], folder: Path | None) -> NDArray[np.float64]:
-        """Allocate an array; with a folder, map it to an unnamed file there so that it takes little memory."""
         size = 8 * prod(shape)
         if folder is None or not size:
             return np.empty(shape)
@@ -347,44 +349,30 @@ class _EnsembleArrays:
                     os.posix_fallocate(file.fileno(), 0, size)
                 self.maps.append(mmap.mmap(file.fileno(), size))
         except OSError as error:
-            warnings.warn(
-                f"{folder} has no room for {size / 1e6:.3g} MB ({error.strerror}): they are in memory",
-                RuntimeWarning,
-                stacklevel=3,
-            )
+            no_room = f"{folder} has no room for {size / 1e6:.3g} MB ({error.strerror}): they are in memory"
+            warnings.warn(no_room, RuntimeWarning, stacklevel=3)
             return np.empty(shape)
         return np.frombuffer(self.maps[-1]).reshape(shape)
 
     def add(self, result: Result) -> None:
-        rows = slice(result.first, result.first + len(result.status))
-        for array, samples in zip(self.samples(), result.samples):
+        rows, own = slice(result.first, result.first + len(result.status)), self._empty
+        for array, samples in zip(self.samples, result.samples):
             array[rows] = samples
         for mapped in self.maps:
             if hasattr(mmap, "MADV_DONTNEED"):
                 mapped.madvise(mmap.MADV_DONTNEED)
-        self.status[rows], self.counts[rows], self.energies[rows] = result.status, result.counts, result.energies
+        own.status[rows], own.counts[rows], own.energies[rows] = result.status, result.counts, result.energies
         self.messages[rows] = result.messages
 
-    def samples(self) -> list[NDArray[np.float64]]:
-        """Return the arrays that batches fill: states and channels, or the chosen outputs."""
-        return [self.states, self.forces] if self.values is None else [self.values]
+    @property
+    def done(self) -> int:
+        """Return the number of runs that are done."""
+        return int(np.count_nonzero(self._empty.status != NOT_RUN))
 
     def ensemble(self) -> Ensemble:
-        for array in self.samples():
-            array[self.counts == 0] = np.nan
-        return Ensemble(
-            time=self.times,
-            states=self.states,
-            forces=self.forces,
-            values=self.values,
-            names=self.names,
-            status=self.status,
-            messages=tuple(self.messages),
-            counts=self.counts,
-            parameters=self.parameters,
-            modes=self.modes,
-            energies=self.energies,
-        )
+        for array in self.samples:
+            array[self._empty.counts == 0] = np.nan
+        return replace(self._empty, messages=tuple(self.messages))
 
 
 def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
@@ -396,14 +384,11 @@ def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions
     kernels = (
         compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows, on_device.run_thread, on_device.DeviceBatch,
     )  # fmt: skip
-    switch = mechanism.switch and getattr(varied_constants(mechanism, parameters)[1], mechanism.switch)
-    switched = bool(np.any(switch)) if mechanism.switch else False
-    ours = [
-        *(machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES})),
-        inspect.getsource(batches),
-        *map(fingerprint, kernels),
-    ]
-    return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
+    switch, constants = mechanism.switch, varied_constants(mechanism, parameters)[1]
+    switched = bool(switch) and bool(np.any(getattr(constants, switch)))
+    ours = (machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES}))
+    compiled_code = (fingerprint(f) if f else "" for f in (*kernels, *functions))
+    return " ".join([*ours, inspect.getsource(batches), *compiled_code])
 
 
 def _check_device(device: str | None, n_jobs: int | None, functions: bool) -> str | None:

@@ -84,23 +84,9 @@ class Samples(NamedTuple):
 #: sample, number of events found, and number found before the present step (``known``). Then 1 in ``started`` once the run has
 #: started, and in ``lost`` the channel that was not finite.
 CARRY = np.dtype(
-    [
-        ("begin", "f8"),
-        ("stop", "f8"),
-        ("elapsed", "f8"),
-        ("interval", "i8"),
-        ("piece", "i8"),
-        ("midway", "i8"),
-        ("step", "f8"),
-        ("steps", "i8"),
-        ("rejected", "i8"),
-        ("evaluations", "i8"),
-        ("sample", "i8"),
-        ("found", "i8"),
-        ("known", "i8"),
-        ("started", "i8"),
-        ("lost", "i8"),
-    ],
+    [(name, "f8") for name in ("begin", "stop", "elapsed", "step")]
+    + [(name, "i8") for name in ("interval", "piece", "midway", "steps", "rejected", "evaluations")]
+    + [(name, "i8") for name in ("sample", "found", "known", "started", "lost")],
     align=True,
 )
 

@@ -194,9 +194,15 @@ def simulate(
         if options:
             raise InputError(f"the {method} method takes no options, but was given {', '.join(options)}")
         return run.solve_compiled(progress, method == "balanced")
+    if method == "Hamming":
+        from .hamming import Hamming
+
+        method = Hamming
+    elif isinstance(method, str) and method not in SCIPY_METHODS:
+        raise unknown_name(method, ("compiled", "balanced", "Hamming", *SCIPY_METHODS), f"method {method!r}")
     from .march import solve
 
-    return solve(run, _solver(method), dict(options), progress)
+    return solve(run, method, dict(options), progress)
 
 
 def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: Any) -> Settings:
@@ -211,21 +217,12 @@ def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: fl
     check_tolerance(tolerance)
     if hold is not None:
         require_kind(hold, Real, "hold", _TIME)
-        _check_hold(hold, times)
+        grid = times[0] + hold * np.arange(len(times))
+        if not hold > 0.0 or np.any(np.abs(grid[:-1] - times[:-1]) > 1e-9 * max(hold, 1e-3 * abs(times[-1]))):
+            raise InputError(f"inputs are held over {hold} s: the recorded times must be {hold} s apart")
     if isinstance(max_steps, bool) or not isinstance(max_steps, Integral) or max_steps < 1:
         raise ParameterError("max_steps", max_steps, "be a whole number, at least 1")
     return Settings(times=times, hold=hold or 0.0, tolerance=tolerance, max_steps=int(max_steps))
-
-
-def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:
-    if isinstance(method, str):
-        if method == "Hamming":
-            from .hamming import Hamming
-
-            return Hamming
-        if method not in SCIPY_METHODS:
-            raise unknown_name(method, ("compiled", "balanced", "Hamming", *SCIPY_METHODS), f"method {method!r}")
-    return method
 
 
 def _check_samples(times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -234,9 +231,3 @@ def _check_samples(times: NDArray[np.float64]) -> NDArray[np.float64]:
     if not (increasing and isfinite(times[0]) and isfinite(times[-1])):
         raise InputError("the recorded times must be at least two finite numbers, increasing")
     return np.ascontiguousarray(times)
-
-
-def _check_hold(hold: float, times: NDArray[np.float64]) -> None:
-    grid = times[0] + hold * np.arange(len(times))
-    if not hold > 0.0 or np.any(np.abs(grid[:-1] - times[:-1]) > 1e-9 * max(hold, 1e-3 * abs(times[-1]))):
-        raise InputError(f"inputs are held over {hold} s: the recorded times must be {hold} s apart")
