@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import wraps
+from functools import partialmethod, wraps
 from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
@@ -51,6 +51,9 @@ STATUS = (
     (ParameterError, 6),
 )
 
+#: What a saved state keeps as it is, beside values and plant.
+_SAVED = ("phase", "stale", "cause", "start_time", "stop_time", "master_tolerance")
+
 #: Reason why a new value is refused during a run, by causality of the variable.
 _NOT_TAKEN = {
     "output": "an output",
@@ -63,9 +66,9 @@ def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap a method of a slave: log an internal error, and keep the instance usable after any exception."""
 
     @wraps(call)
-    def method(self: LinkworkSlave, *arguments: Any) -> Any:
+    def method(self: LinkworkSlave, *arguments: Any, **keywords: Any) -> Any:
         try:
-            return call(self, *arguments)
+            return call(self, *arguments, **keywords)
         except BaseException as error:
             if not isinstance(error, LinkworkError):
                 self.log(f"internal error in {call.__name__}: {error!r}", Fmi2Status.fatal)
@@ -236,6 +239,7 @@ class LinkworkSlave(Fmi2Slave):
 
     # Values
 
+    @_guarded
     def _get(self, references: list[int], kind: str) -> list[Any]:
         for reference in references:
             self._check_reference(reference, kind)
@@ -257,6 +261,7 @@ class LinkworkSlave(Fmi2Slave):
         if self._kinds[reference] != kind:
             raise self._fail(LinkworkError(f"variable {self._names[reference]} is not of type {kind}"))
 
+    @_guarded
     def _set(self, references: list[int], values: list[Any], kind: str) -> None:
         if self._phase == TERMINATED:
             self._expect(f"fmi2Set{kind}", RUNNING)
@@ -289,52 +294,24 @@ class LinkworkSlave(Fmi2Slave):
                 else:
                     self._plant = None
 
-    @_guarded
-    def get_real(self, vrs: list[int]) -> list[float]:
-        return self._get(vrs, "Real")
-
-    @_guarded
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        return self._get(vrs, "Integer")
-
-    @_guarded
-    def get_string(self, vrs: list[int]) -> list[str]:
-        return self._get(vrs, "String")
-
-    @_guarded
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        return self._get(vrs, "Boolean")
-
-    @_guarded
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        self._set(vrs, values, "Real")
-
-    @_guarded
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        self._set(vrs, values, "Integer")
-
-    @_guarded
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        self._set(vrs, values, "String")
-
-    @_guarded
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        self._set(vrs, values, "Boolean")
+    get_real = partialmethod(_get, kind="Real")
+    set_real = partialmethod(_set, kind="Real")
+    get_integer = partialmethod(_get, kind="Integer")
+    set_integer = partialmethod(_set, kind="Integer")
+    get_string = partialmethod(_get, kind="String")
+    set_string = partialmethod(_set, kind="String")
+    get_boolean = partialmethod(_get, kind="Boolean")
+    set_boolean = partialmethod(_set, kind="Boolean")
 
     # Saved state
 
     @_guarded
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
+            **{name: getattr(self, f"_{name}") for name in _SAVED},
             "model": type(self).__name__,
             "interface": self.guid_of_interface,
             "values": list(self._values),
-            "phase": self._phase,
-            "stale": self._stale,
-            "cause": self._cause,
-            "start_time": self._start_time,
-            "stop_time": self._stop_time,
-            "master_tolerance": self._master_tolerance,
             "plant": None if self._plant is None else self._plant.save(),
         }
 
@@ -349,21 +326,15 @@ class LinkworkSlave(Fmi2Slave):
                     f"{type(self).__name__}"
                 )
             plant = None if state["plant"] is None else Plant.restore(self.mechanism, state["plant"])
-            values, cause = list(state["values"]), state["cause"]
-            phase, stale = state["phase"], state["stale"]
-            start_time, master_tolerance = state["start_time"], state["master_tolerance"]
-            stop_time = state["stop_time"]
-            if phase not in PHASES or (phase == RUNNING and plant is None):
-                raise StateError(f"the saved state is damaged: a slave that is {phase!r} without a plant")
+            restored = {name: state[name] for name in _SAVED} | {"values": list(state["values"]), "plant": plant}
+            if state["phase"] not in PHASES or (state["phase"] == RUNNING and plant is None):
+                raise StateError(f"the saved state is damaged: a slave that is {state['phase']!r} without a plant")
         except LinkworkError as error:
             raise self._fail(error) from error
         except (KeyError, TypeError) as error:
             raise self._fail(StateError(f"the saved state is damaged: {error!r}")) from error
-        self._plant = plant
-        self._values = values
-        self._cause = None if cause is None else (cause[0], cause[1])
-        self._phase, self._stale = phase, stale
-        self._start_time, self._stop_time, self._master_tolerance = start_time, stop_time, master_tolerance
+        for name, value in restored.items():
+            setattr(self, f"_{name}", value)
 
     _fmu_state_to_bytes, _fmu_state_from_bytes = staticmethod(write_state), staticmethod(read_state)
 

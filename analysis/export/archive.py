@@ -74,7 +74,6 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
 def common_files(
     mechanism: Mechanism,
     variables: Sequence[Variable],
-    title: str,
     made: str,
     notes: Sequence[str],
     icon: str = "model.png",
@@ -101,7 +100,7 @@ def common_files(
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<title>{title}</title>
+<title>{mechanism.title}</title>
 <style>
 body {{ font-family: sans-serif; max-width: 70em; margin: 2em auto; padding: 0 1em; color: #222; }}
 table {{ border-collapse: collapse; font-size: 90%; }}

@@ -150,7 +150,7 @@ def build_native(
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     icon = "model.png" if kind.fmi == 2 else "terminalsAndIcons/icon.png"
-    entries |= common_files(mechanism, variables, mechanism.title, made, _NOTES, icon)
+    entries |= common_files(mechanism, variables, made, _NOTES, icon)
     target = dest / kind.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 

@@ -80,7 +80,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     raw["modelDescription.xml"] = described
     entries = add_guard(raw, name, (sources / "guard.c").read_bytes())
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
-    entries |= common_files(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
+    entries |= common_files(mechanism, mechanism.variables, made, (_NEEDS_PYTHON,))
     target = dest / PYTHON.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=False, fmi=2), target)
 

@@ -55,57 +55,41 @@ def rk_step(f: Callable[[Vector], Vector], x: Vector, k1: Vector, h: float, scal
     a1, a2, a3, a4 = _A[6]
     k7 = f(tuple([y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6) for y, p1, p4, p5, p6 in zip(x, k1, k4, k5, k6)]))
     a1, a2, a3, a4, a5 = _A[7]
-    k8 = f(
-        tuple(
-            [
-                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7)
-                for y, p1, p4, p5, p6, p7 in zip(x, k1, k4, k5, k6, k7)
-            ]
-        )
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7)
+        for y, p1, p4, p5, p6, p7 in zip(x, k1, k4, k5, k6, k7)
+    ]
+    k8 = f(tuple(new))
     a1, a2, a3, a4, a5, a6 = _A[8]
-    k9 = f(
-        tuple(
-            [
-                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8)
-                for y, p1, p4, p5, p6, p7, p8 in zip(x, k1, k4, k5, k6, k7, k8)
-            ]
-        )
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8)
+        for y, p1, p4, p5, p6, p7, p8 in zip(x, k1, k4, k5, k6, k7, k8)
+    ]
+    k9 = f(tuple(new))
     a1, a2, a3, a4, a5, a6, a7 = _A[9]
-    k10 = f(
-        tuple(
-            [
-                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9)
-                for y, p1, p4, p5, p6, p7, p8, p9 in zip(x, k1, k4, k5, k6, k7, k8, k9)
-            ]
-        )
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9)
+        for y, p1, p4, p5, p6, p7, p8, p9 in zip(x, k1, k4, k5, k6, k7, k8, k9)
+    ]
+    k10 = f(tuple(new))
     a1, a2, a3, a4, a5, a6, a7, a8 = _A[10]
-    k11 = f(
-        tuple(
-            [
-                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10)
-                for y, p1, p4, p5, p6, p7, p8, p9, p10 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10)
-            ]
-        )
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10)
+        for y, p1, p4, p5, p6, p7, p8, p9, p10 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10)
+    ]
+    k11 = f(tuple(new))
     a1, a2, a3, a4, a5, a6, a7, a8, a9 = _A[11]
-    k12 = f(
-        tuple(
-            [
-                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10 + a9 * p11)
-                for y, p1, p4, p5, p6, p7, p8, p9, p10, p11 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10, k11)
-            ]
-        )
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10 + a9 * p11)
+        for y, p1, p4, p5, p6, p7, p8, p9, p10, p11 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10, k11)
+    ]
+    k12 = f(tuple(new))
     a1, a2, a3, a4, a5, a6, a7, a8 = _A[12]
-    x_new = tuple(
-        [
-            y + h * (a1 * p1 + a2 * p6 + a3 * p7 + a4 * p8 + a5 * p9 + a6 * p10 + a7 * p11 + a8 * p12)
-            for y, p1, p6, p7, p8, p9, p10, p11, p12 in zip(x, k1, k6, k7, k8, k9, k10, k11, k12)
-        ]
-    )
+    new = [
+        y + h * (a1 * p1 + a2 * p6 + a3 * p7 + a4 * p8 + a5 * p9 + a6 * p10 + a7 * p11 + a8 * p12)
+        for y, p1, p6, p7, p8, p9, p10, p11, p12 in zip(x, k1, k6, k7, k8, k9, k10, k11, k12)
+    ]
+    x_new = tuple(new)
     # Hairer's estimate: |h| err5^2 / sqrt(err5^2 + 0.01 err3^2), a combination of order 8 in h
     e1, e2, e3, e4, e5, e6, e7, e8 = _E5
     d1, d2, d3, d4, d5, d6, d7, d8 = _E3

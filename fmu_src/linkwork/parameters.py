@@ -71,8 +71,8 @@ class Rules(NamedTuple):
     least: tuple[LowerBound, ...] = ()
 
 
-def check_parameters(parameters: Any) -> None:
-    """Check a frozen dataclass of parameters against its ``RULES`` and convert its fields to plain numbers.
+class CheckedParameters:
+    """Base of a mechanism's parameters, a frozen dataclass: its fields are checked against its ``RULES``, made plain numbers.
 
     Raises
     ------
@@ -80,82 +80,74 @@ def check_parameters(parameters: Any) -> None:
         For the first field that breaks a rule, or is too large or too small to compute with; if none is, but a constant of
         the equations is not finite, for the field of the most extreme magnitude.
     """
-    rules: Rules = parameters.RULES
-    for field in fields(parameters):
-        name = fmi_name(field.name)
-        value = getattr(parameters, field.name)
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise ParameterError(name, value, "be a number in SI units")
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        parameters: Any = self
+        rules: Rules = parameters.RULES
+        for field in fields(parameters):
+            name = fmi_name(field.name)
+            value = getattr(parameters, field.name)
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise ParameterError(name, value, "be a number in SI units")
+            try:
+                number: float = float(value)
+                if field.name in rules.signs and number.is_integer():
+                    number = int(number)
+            except (OverflowError, ValueError):
+                raise ParameterError(name, value, "be a finite number") from None
+            # plain Python numbers, whatever type was given: the equations and JSON accept no other type
+            object.__setattr__(parameters, field.name, number)
+            value = number
+            if field.name in rules.signs:
+                if value not in (1, -1):
+                    raise ParameterError(name, value, f"be +1 or -1, {rules.signs[field.name]}")
+            elif field.name in rules.positive:
+                if not (isfinite(value) and value > 0.0):
+                    raise ParameterError(name, value, POSITIVE)
+            elif field.name in rules.free_sign:
+                if not isfinite(value):
+                    raise ParameterError(name, value, "be a finite number")
+            elif not (isfinite(value) and value >= 0.0):
+                raise ParameterError(name, value, NOT_NEGATIVE)
+        for field in fields(parameters):
+            value = getattr(parameters, field.name)
+            if abs(value) > GREATEST:
+                raise ParameterError(fmi_name(field.name), value, TOO_LARGE)
+            if field.name in rules.positive and value < 1.0 / GREATEST:
+                raise ParameterError(fmi_name(field.name), value, TOO_SMALL)
+        for least in rules.least:
+            bound, value = least.of(parameters), getattr(parameters, least.field)
+            if value < bound:
+                raise ParameterError(fmi_name(least.field), value, least.requirement.replace("%g", f"{bound:g}"))
         try:
-            number: float = float(value)
-            if field.name in rules.signs and number.is_integer():
-                number = int(number)
-        except (OverflowError, ValueError):
-            raise ParameterError(name, value, "be a finite number") from None
-        # plain Python numbers, whatever type was given: the equations and JSON accept no other type
-        object.__setattr__(parameters, field.name, number)
-        value = number
-        if field.name in rules.signs:
-            if value not in (1, -1):
-                raise ParameterError(name, value, f"be +1 or -1, {rules.signs[field.name]}")
-        elif field.name in rules.positive:
-            if not (isfinite(value) and value > 0.0):
-                raise ParameterError(name, value, POSITIVE)
-        elif field.name in rules.free_sign:
-            if not isfinite(value):
-                raise ParameterError(name, value, "be a finite number")
-        elif not (isfinite(value) and value >= 0.0):
-            raise ParameterError(name, value, NOT_NEGATIVE)
-    for field in fields(parameters):
-        value = getattr(parameters, field.name)
-        if abs(value) > GREATEST:
-            raise ParameterError(fmi_name(field.name), value, TOO_LARGE)
-        if field.name in rules.positive and value < 1.0 / GREATEST:
-            raise ParameterError(fmi_name(field.name), value, TOO_SMALL)
-    for least in rules.least:
-        bound, value = least.of(parameters), getattr(parameters, least.field)
-        if value < bound:
-            raise ParameterError(fmi_name(least.field), value, least.requirement.replace("%g", f"{bound:g}"))
-    try:
-        finite = all(isfinite(constant) for constant in parameters.constants())
-    except ArithmeticError:
-        finite = False
-    if finite:
-        return
-    values = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
-    extreme = max((name for name in values if values[name]), key=lambda name: abs(log10(abs(values[name]))))
-    size = "small" if abs(values[extreme]) > 1.0 else "large"
-    raise ParameterError(fmi_name(extreme), values[extreme], f"be {size} enough for finite moments of inertia")
+            finite = all(isfinite(constant) for constant in parameters.constants())
+        except ArithmeticError:
+            finite = False
+        if finite:
+            return
+        values = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
+        extreme = max((name for name in values if values[name]), key=lambda name: abs(log10(abs(values[name]))))
+        size = "small" if abs(values[extreme]) > 1.0 else "large"
+        raise ParameterError(fmi_name(extreme), values[extreme], f"be {size} enough for finite moments of inertia")
 
 
-def check_initial(initial: Any) -> None:
-    """Check that the fields of an initial state are finite and convert them to floats.
+class CheckedState:
+    """Base of a mechanism's initial state, a frozen dataclass: its fields must be finite, and are made floats.
 
     Raises
     ------
     ParameterError
         For the first field that is not a finite number.
     """
-    for field in fields(initial):
-        value = getattr(initial, field.name)
-        if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
-            raise ParameterError(f"initial.{field.name}", value, "be a finite number")
-        object.__setattr__(initial, field.name, float(value))
-
-
-class CheckedParameters:
-    """Base of a mechanism's parameters, a frozen dataclass: its fields are checked against its ``RULES``."""
 
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        check_parameters(self)
-
-
-class CheckedState:
-    """Base of a mechanism's initial state, a frozen dataclass: its fields must be finite."""
-
-    __slots__ = ()
-
-    def __post_init__(self) -> None:
-        check_initial(self)
+        initial: Any = self
+        for field in fields(initial):
+            value = getattr(initial, field.name)
+            if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
+                raise ParameterError(f"initial.{field.name}", value, "be a finite number")
+            object.__setattr__(initial, field.name, float(value))

@@ -270,10 +270,9 @@ def pin_pin_slide(
     ex = bias[0] - z * t.s * beta - z * t.c * ww - w2 * t.s - p.columns[-1][0] - ax
     ey = bias[1] + z * t.c * beta - z * t.s * ww + w2 * t.c - p.columns[-1][1] - ay
     b1 = (t.c * ey - t.s * ex) / root
-    columns = (*((g, 0.0) for g in gz), (-off * b1 - t.c * ex - t.s * ey, 0.0))
     return (
         Turn(c1, s1, w1, (*g1, b1)),
-        Vector(z, 0.0, vz, 0.0, columns),
+        _sliding_arm(z, vz, gz, -off * b1 - t.c * ex - t.s * ey),
         branch * root / sqrt(a.x * a.x + a.y * a.y),
     )
 

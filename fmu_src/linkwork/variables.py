@@ -229,16 +229,8 @@ POSITION, RATE = ("state", "position"), ("speed", "velocity")
 
 def tolerance_parameter() -> Variable:
     """Return the variable ``solver.tolerance`` of every FMU, which bounds the local error of a step."""
-    return Variable(
-        "solver.tolerance",
-        "parameter",
-        "1",
-        "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter",
-        "",
-        1e-9,
-        minimum=1e-13,
-        maximum=1e-2,
-    )
+    text = "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter"
+    return Variable("solver.tolerance", "parameter", "1", text, start=1e-9, minimum=1e-13, maximum=1e-2)
 
 
 def status_variables() -> tuple[Variable, Variable]:
@@ -246,28 +238,13 @@ def status_variables() -> tuple[Variable, Variable]:
 
     They are local, because some masters read every output as a Real.
     """
+    codes = (
+        "0 good; 1 step out of order; 2 input not finite; 3 limit of assembly; 4 tolerance not met; "
+        "5 not initialised; 6 bad parameter; 9 internal error"
+    )
+    text = "Why the last step was refused, in one sentence; empty while solver.status is 0"
+    rest: dict[str, Any] = {"depends": "state", "level": "none"}
     return (
-        Variable(
-            "solver.status",
-            "local",
-            "",
-            "0 good; 1 step out of order; 2 input not finite; 3 limit of assembly; 4 tolerance not met; "
-            "5 not initialised; 6 bad parameter; 9 internal error",
-            start=0,
-            kind="Integer",
-            minimum=0,
-            maximum=9,
-            depends="state",
-            level="none",
-        ),
-        Variable(
-            "solver.message",
-            "local",
-            "",
-            "Why the last step was refused, in one sentence; empty while solver.status is 0",
-            start="",
-            kind="String",
-            depends="state",
-            level="none",
-        ),
+        Variable("solver.status", "local", "", codes, "", 0, "Integer", 0, 9, **rest),
+        Variable("solver.message", "local", "", text, "", "", "String", **rest),
     )

@@ -22,7 +22,7 @@ typedef struct {
     uint32_t reference, order;
 } Request;
 
-/* Of the methods, the result or a status. */
+/* The result of a method, or a status: a list, or anything else, whose numbers of eight bytes begin at eight. */
 typedef struct {
     bool failed;
     union {
@@ -36,8 +36,16 @@ typedef struct {
     union {
         uint8_t status;
         uint64_t count;
+        struct {
+            double time;
+            bool event, terminate, early;
+        } step;
+        struct {
+            bool again, terminate, nominals, values, given;
+            double time;
+        } event;
     } is;
-} Counted;
+} Outcome;
 
 __attribute__((import_module("callbacks"), import_name("log-message"))) void host_log(const char *name, size_t name_size,
                                                                                       int status, const char *category,
@@ -89,21 +97,16 @@ static char *text(const char *data, size_t size) {
 
 static Listed *listed(fmi3Status status, const void *data, size_t count) {
     static Listed result;
-    result.failed = status > fmi3Warning;
-    if (result.failed)
-        result.is.status = status;
-    else
-        result.is.list = (List){data, count};
+    result = (Listed){status > fmi3Warning, {.list = {data, count}}};
+    if (result.failed) result.is.status = status;
     return &result;
 }
 
-static Counted *counted(fmi3Status status, size_t count) {
-    static Counted result;
+static Outcome *outcome(fmi3Status status, Outcome found) {
+    static Outcome result;
+    result = found;
     result.failed = status > fmi3Warning;
-    if (result.failed)
-        result.is.status = status;
-    else
-        result.is.count = count;
+    if (result.failed) result.is.status = status;
     return &result;
 }
 
@@ -240,9 +243,10 @@ NO_SETTING(IntervalFraction, "interval-fraction", NULL, NULL)
 NO_SETTING(ShiftDecimal, "shift-decimal", NULL)
 NO_SETTING(ShiftFraction, "shift-fraction", NULL, NULL)
 
-EXPORT("get-number-of-variable-dependencies") Counted *count_dependencies(void *c, uint32_t reference) {
+EXPORT("get-number-of-variable-dependencies") Outcome *count_dependencies(void *c, uint32_t reference) {
     size_t count = 0;
-    return counted(fmi3GetNumberOfVariableDependencies(c, reference, &count), count);
+    fmi3Status status = fmi3GetNumberOfVariableDependencies(c, reference, &count);
+    return outcome(status, (Outcome){.is.count = count});
 }
 
 EXPORT("get-variable-dependencies") Listed *dependencies(void *c, uint32_t reference) {
@@ -308,48 +312,18 @@ EXPORT("get-output-derivatives") Listed *get_output_slopes(void *c, const Reques
 
 /* Steps and events */
 
-typedef struct {
-    bool failed;
-    union {
-        uint8_t status;
-        struct {
-            double time;
-            bool event, terminate, early;
-        } step;
-        struct {
-            bool again, terminate, nominals, values, given;
-            double time;
-        } event;
-    } is;
-} Stepped;
-
-EXPORT("do-step") Stepped *step(void *c, double time, double size, bool no_going_back) {
-    static Stepped result;
-    double last = time;
-    bool event = false, terminate = false, early = false;
-    fmi3Status status = fmi3DoStep(c, time, size, no_going_back, &event, &terminate, &early, &last);
-    result.failed = status > fmi3Warning;
-    if (result.failed)
-        result.is.status = status;
-    else
-        result.is.step.time = last, result.is.step.event = event, result.is.step.terminate = terminate,
-        result.is.step.early = early;
-    return &result;
+EXPORT("do-step") Outcome *step(void *c, double time, double size, bool no_going_back) {
+    Outcome found = {.is.step = {.time = time}};
+    fmi3Status status = fmi3DoStep(c, time, size, no_going_back, &found.is.step.event, &found.is.step.terminate,
+                                   &found.is.step.early, &found.is.step.time);
+    return outcome(status, found);
 }
 
-EXPORT("update-discrete-states") Stepped *update(void *c) {
-    static Stepped result;
-    bool again, terminate, nominals, values, given;
-    double time;
-    fmi3Status status = fmi3UpdateDiscreteStates(c, &again, &terminate, &nominals, &values, &given, &time);
-    result.failed = status > fmi3Warning;
-    if (result.failed)
-        result.is.status = status;
-    else {
-        result.is.event.again = again, result.is.event.terminate = terminate, result.is.event.nominals = nominals;
-        result.is.event.values = values, result.is.event.given = given, result.is.event.time = time;
-    }
-    return &result;
+EXPORT("update-discrete-states") Outcome *update(void *c) {
+    Outcome found = {0};
+    fmi3Status status = fmi3UpdateDiscreteStates(c, &found.is.event.again, &found.is.event.terminate, &found.is.event.nominals,
+                                                 &found.is.event.values, &found.is.event.given, &found.is.event.time);
+    return outcome(status, found);
 }
 
 EXPORT("completed-integrator-step") uint8_t *completed(void *c, bool no_going_back) {
@@ -384,10 +358,10 @@ STATES_OF(NominalsOfContinuousStates, "get-nominals-of-continuous-states", STATE
 STATES_OF(EventIndicators, "get-event-indicators", 1)
 
 #define NUMBER_OF(name, method)                                                                                                \
-    EXPORT(method) Counted *count_##name(void *c) {                                                                            \
+    EXPORT(method) Outcome *count_##name(void *c) {                                                                            \
         size_t count = 0;                                                                                                      \
         fmi3Status status = fmi3GetNumberOf##name(c, &count);                                                                  \
-        return counted(status, count);                                                                                         \
+        return outcome(status, (Outcome){.is.count = count});                                                                  \
     }
 
 NUMBER_OF(ContinuousStates, "get-number-of-continuous-states")

@@ -54,23 +54,16 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
 
 /* Values */
 
-fmi2Status fmi2GetReal(fmi2Component component, const Reference references[], size_t count, fmi2Real values[]) {
-    ALLOW(SETTLED)
-    NEED(ARRAYS)
-    EACH(instance_get(c, __func__, references[i], REAL, &values[i]))
-}
+#define GET(type, call)                                                                                                        \
+    fmi2Status fmi2Get##type(fmi2Component component, const Reference references[], size_t count, fmi2##type values[]) {       \
+        ALLOW(SETTLED)                                                                                                         \
+        NEED(ARRAYS)                                                                                                           \
+        EACH(call)                                                                                                             \
+    }
 
-fmi2Status fmi2GetInteger(fmi2Component component, const Reference references[], size_t count, fmi2Integer values[]) {
-    ALLOW(SETTLED)
-    NEED(ARRAYS)
-    EACH(instance_get_integer(c, __func__, references[i], &values[i]))
-}
-
-fmi2Status fmi2GetString(fmi2Component component, const Reference references[], size_t count, fmi2String values[]) {
-    ALLOW(SETTLED)
-    NEED(ARRAYS)
-    EACH(instance_get_text(c, __func__, references[i], &values[i]))
-}
+GET(Real, instance_get(c, __func__, references[i], REAL, &values[i]))
+GET(Integer, instance_get_integer(c, __func__, references[i], &values[i]))
+GET(String, instance_get_text(c, __func__, references[i], &values[i]))
 
 fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], size_t count, const fmi2Real values[]) {
     ALLOW(SETTABLE | CONTINUOUS)
@@ -97,23 +90,16 @@ fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[],
     SET_EACH(INTEGER)
 }
 
-fmi2Status fmi2SetString(fmi2Component component, const Reference references[], size_t count, const fmi2String values[]) {
-    (void)references, (void)values;
-    ALLOW(SETTABLE)
-    RETURN(instance_none(c, __func__, count));
-}
+#define NONE(name, type, phases)                                                                                               \
+    fmi2Status fmi2##name(fmi2Component component, const Reference references[], size_t count, type values[]) {                \
+        (void)references, (void)values;                                                                                        \
+        ALLOW(phases)                                                                                                          \
+        RETURN(instance_none(c, __func__, count));                                                                             \
+    }
 
-fmi2Status fmi2GetBoolean(fmi2Component component, const Reference references[], size_t count, fmi2Boolean values[]) {
-    (void)references, (void)values;
-    ALLOW(ANY_STATE)
-    RETURN(instance_none(c, __func__, count));
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component component, const Reference references[], size_t count, const fmi2Boolean values[]) {
-    (void)references, (void)values;
-    ALLOW(ANY_STATE)
-    RETURN(instance_none(c, __func__, count));
-}
+NONE(SetString, const fmi2String, SETTABLE)
+NONE(GetBoolean, fmi2Boolean, ANY_STATE)
+NONE(SetBoolean, const fmi2Boolean, ANY_STATE)
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const Reference unknowns[], size_t unknown_count,
                                         const Reference knowns[], size_t known_count, const fmi2Real change[],

@@ -28,7 +28,7 @@ static void call(Equation *equation, const double **arguments, double **results)
 
 /* Inputs */
 
-static void inputs(const Plant *a, double u[ROOM(INPUTS)]) {
+void plant_inputs(const Plant *a, double u[ROOM(INPUTS)]) {
     for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]];
 }
 
@@ -64,7 +64,7 @@ static void state_derivative(const Plant *a, const double x[STATES], const doubl
 
 static double state_clearance(const Plant *a, const double x[STATES]) {
     double u[ROOM(INPUTS)], result;
-    inputs(a, u);
+    plant_inputs(a, u);
     call(equations_clearance, (const double *[]){x, a->modes, u, a->p}, (double *[]){&result});
     return result;
 }
@@ -72,7 +72,7 @@ static double state_clearance(const Plant *a, const double x[STATES]) {
 /* The inputs for a jump to the commands marked: one that is in force and not marked keeps its rate. Whether any is. */
 static bool inputs_of_jump(const Plant *a, const bool marked[ROOM(COMMANDS)], const double x[STATES], double u[ROOM(INPUTS)]) {
     bool any = false;
-    inputs(a, u);
+    plant_inputs(a, u);
     for (int c = 0; c < COMMANDS; c++)
         if (in_force(a, &commands[c])) {
             any |= marked[c];
@@ -236,10 +236,11 @@ Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentenc
     return LIMIT_OF_ASSEMBLY;
 }
 
-static void what_begins(const Plant *a, double own[ROOM(PARAMETERS)], double state[2 * FREEDOMS], double u[ROOM(INPUTS)]) {
-    for (int i = 0; i < PARAMETERS; i++) own[i] = a->given[parameter_at[i]];
-    for (int i = 0; i < 2 * FREEDOMS; i++) state[i] = a->given[initial_at[i]];
-    inputs(a, u);
+void plant_split(const Plant *a, const double given[VARIABLES], double own[ROOM(PARAMETERS)], double state[2 * FREEDOMS],
+                 double u[ROOM(INPUTS)]) {
+    for (int i = 0; i < PARAMETERS; i++) own[i] = given[parameter_at[i]];
+    for (int i = 0; i < 2 * FREEDOMS; i++) state[i] = given[initial_at[i]];
+    for (int i = 0; i < INPUTS; i++) u[i] = given[input_at[i]];
     for (int c = 0; c < COMMANDS; c++)
         if (in_force(a, &commands[c])) state[commands[c].rate] = u[commands[c].input];
 }
@@ -252,7 +253,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     if (reason == GOOD) reason = check_inputs(a, sentence);
     if (reason != GOOD) return reason;
     for (int i = 0; i < MODES; i++) a->modes[i] = a->given[mode_at[i]];
-    what_begins(a, own, state, u);
+    plant_split(a, a->given, own, state, u);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){a->p, a->x, a->scale});
     if (!all_finite(a->p, CONSTANTS - 1)) return blame_extreme(a, sentence);
     reason = plant_check_assembly(a, a->x, sentence);
@@ -271,7 +272,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
         a->applied[c] = u[commands[c].input];
     }
     a->applied_time = a->seen_time = a->time;
-    inputs(a, a->seen);
+    plant_inputs(a, a->seen);
     a->begun = 1.0;
     return GOOD;
 }
@@ -279,7 +280,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
 /* Constants of the parameters given, with the energy at the state. */
 static double start_energy(const Plant *a, double p[CONSTANTS]) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)], x[STATES], scale[STATES];
-    what_begins(a, own, state, u);
+    plant_split(a, a->given, own, state, u);
     memcpy(state, a->x, sizeof state);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){p, x, scale});
     return p[CONSTANTS - 1];
@@ -305,7 +306,7 @@ Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTEN
 static void follow_twists(Plant *a, const double x[STATES], double time) {
 #if TWISTS > 0
     double u[ROOM(INPUTS)], y[ROOM(OUTPUTS)];
-    inputs(a, u);
+    plant_inputs(a, u);
     call(equations_outputs, (const double *[]){x, a->modes, u, a->p}, (double *[]){y});
     for (int i = 0; i < TWISTS; i++) {
         double angle = y[twists[i].output];
@@ -535,7 +536,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
     Reason reason = check_inputs(a, sentence);
     if (reason != GOOD) return reason;
     plant_present(a, x);
-    inputs(a, u);
+    plant_inputs(a, u);
     call(equations_outputs, (const double *[]){x, a->modes, u, a->p}, (double *[]){y});
     if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
@@ -564,7 +565,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
 bool plant_derivative(const Plant *a, double derivative[STATES]) {
     double x[STATES], u[ROOM(INPUTS)];
     plant_present(a, x);
-    inputs(a, u);
+    plant_inputs(a, u);
     state_derivative(a, x, u, derivative);
     return all_finite(derivative, STATES);
 }
@@ -603,11 +604,8 @@ void plant_forward(const Plant *a, bool start, const double given[VARIABLES], co
     memcpy(dx, x, sizeof dx);
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS];
-        what_begins(a, own, state, u);
-        for (int i = 0; i < PARAMETERS; i++) down[i] = given[parameter_at[i]];
-        for (int i = 0; i < 2 * FREEDOMS; i++) dstate[i] = given[initial_at[i]];
-        for (int c = 0; c < COMMANDS; c++)
-            if (in_force(a, &commands[c])) dstate[commands[c].rate] = du[commands[c].input];
+        plant_split(a, a->given, own, state, u);
+        plant_split(a, given, down, dstate, du);
         call(equations_begin_forward, (const double *[]){a->modes, own, state, u, down, dstate, du}, (double *[]){dp, dx});
     } else {
         for (int c = 0; c < COMMANDS; c++) changed[c] = du[commands[c].input] != 0.0;
@@ -617,7 +615,7 @@ void plant_forward(const Plant *a, bool start, const double given[VARIABLES], co
             memcpy(dx, dafter, sizeof dx);
         }
     }
-    inputs(a, u);
+    plant_inputs(a, u);
     call(equations_forward, (const double *[]){after, a->modes, u, a->p, dx, du, dp},
          (double *[]){rows, rows + DERIVATIVE_ROW, rows + MARGIN_ROW});
     memcpy(rows + STATE_ROW, dx, sizeof dx);
@@ -632,7 +630,7 @@ void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bo
     memset(given, 0, VARIABLES * sizeof *given);
     memcpy(after, a->x, sizeof after);
     if (jumps) call(equations_jump, (const double *[]){a->x, a->modes, before_jump, a->p}, (double *[]){after});
-    inputs(a, u);
+    plant_inputs(a, u);
     call(equations_reverse, (const double *[]){after, a->modes, u, a->p, rows, rows + DERIVATIVE_ROW, rows + MARGIN_ROW},
          (double *[]){x, gu, gp});
     for (int i = 0; i < STATES; i++) x[i] += rows[STATE_ROW + i];
@@ -650,7 +648,7 @@ void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bo
     }
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], gown[ROOM(PARAMETERS)], gstate[2 * FREEDOMS];
-        what_begins(a, own, state, u);
+        plant_split(a, a->given, own, state, u);
         call(equations_begin_reverse, (const double *[]){a->modes, own, state, u, gp, x}, (double *[]){gown, gstate, gu});
         for (int i = 0; i < INPUTS; i++) given[input_at[i]] += gu[i];
         for (int i = 0; i < PARAMETERS; i++) given[parameter_at[i]] += gown[i];

@@ -52,6 +52,12 @@ typedef struct {
     void *context;
 } Watch;
 
+/* The inputs, and all that a run begins with, of what is given or of its change: parameters, state and inputs. A command in force
+   is the rate of its freedom. */
+LOCAL void plant_inputs(const Plant *a, double u[ROOM(INPUTS)]);
+LOCAL void plant_split(const Plant *a, const double given[VARIABLES], double own[ROOM(PARAMETERS)], double state[2 * FREEDOMS],
+                       double u[ROOM(INPUTS)]);
+
 /* Put start values in the place of all that was given. */
 LOCAL void plant_reset(Plant *a);
 

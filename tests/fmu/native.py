@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import re
+import weakref
 import zipfile
 from collections.abc import Iterator, Sequence
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_size_t, c_uint32, c_void_p
@@ -98,7 +99,10 @@ class Library:
 
 
 class Instance:
-    """An instance; ``log`` has the pairs (status, message) that it has logged."""
+    """An instance; ``log`` has the pairs (status, message) that it has logged.
+
+    ``update`` is called in intermediate updates, with the instance and the arguments of the standard after it.
+    """
 
     def __init__(
         self,
@@ -130,7 +134,8 @@ class Instance:
         else:
             self._logger = LOG_3(lambda _, status, category, text: self._say(status, text))
             logger = self._logger if callbacks else None
-            self._update = None if update is None else UPDATE(update)
+            me = weakref.proxy(self)
+            self._update = None if update is None else UPDATE(lambda _, *arguments: update(me, *arguments) and None)
             head = (name, key, None, ctypes.c_bool(False), ctypes.c_bool(logging))
             if interface == "me":
                 self.handle = dll.fmi3InstantiateModelExchange(*head, None, logger)
@@ -228,6 +233,16 @@ class Instance:
         assert self.enter() == OK
         assert self("ExitInitializationMode") == OK
         return self
+
+    def continuous(self, **values: float) -> Instance:
+        """Start, and enter continuous-time mode; return the instance itself."""
+        self.start(**values)
+        assert self("EnterContinuousTimeMode") == OK
+        return self
+
+    def put_states(self, *x: float) -> int:
+        """Set the continuous states; return the status."""
+        return self("SetContinuousStates", (c_double * len(x))(*x), c_size_t(len(x)))
 
     def step(self, time: float, step: float) -> int:
         """Take a communication step and return its status."""

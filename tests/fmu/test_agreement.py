@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, simulate_fmu
+from fmpy import extract
 
 from analysis import CosimulationError, Function, Harmonics, InductionMotor, Inputs, cosimulate, simulate
 from analysis.mechanisms import find_mechanism
 from analysis.run import CASES
 from linkwork.errors import InputError
-from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.five_bar.published import TABLE_3_1
 
 from .drawn import MECHANISMS, drawn
 from .native import ERROR, OK, Instance, Library
@@ -203,15 +203,6 @@ def without_exchange(root: str, fmu: str) -> str:
     except CosimulationError as error:
         return str(error)
     return ""
-
-
-@pytest.mark.parametrize("file", ["FiveBarSlider-native", "FiveBarSlider-native-fmi3"])
-def test_fmpy_alone_runs_model_exchange_up_to_the_stop_time(natives: dict[str, Path], file: str) -> None:
-    # its CVode tries times beyond the stop time
-    options = {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": 1e-11, "output_interval": 0.01}
-    result = simulate_fmu(str(natives[file]), stop_time=0.3, output=["slider.position"], **options)
-    right = simulate(TABLE_3_1, Inputs(speed=SETS["table-3.1"].crank_speed), stop_time=0.3, step=0.01, tolerance=1e-11)
-    np.testing.assert_allclose(result["slider.position"], right["slider.position"], atol=1e-9)
 
 
 @pytest.mark.parametrize("file", ["FiveBarSlider-native", "FiveBarSlider-native-fmi3"])

@@ -126,10 +126,6 @@ def test_guid_changes_with_the_interface_and_only_then(
     assert (guid(build_variant(changes)) == guid(fmu)) is same
 
 
-def test_guids_of_the_models_differ(fmus: dict[str, Path]) -> None:
-    assert len({guid(fmu) for fmu in fmus.values()}) == len(fmus)
-
-
 @pytest.mark.parametrize("missing", ["slave.py", "linkwork", "linkwork/{plant}", "linkwork/{plant}/dynamics.py"])
 def test_incomplete_sources(tmp_path: Path, model: Model, missing: str) -> None:
     sources = changed_sources(tmp_path, {})

@@ -45,23 +45,11 @@ ADDED = ("time", "power.dissipated", "power.supplied", "assembly.margin_to_limit
 
 #: Exponents of kg, m, s and rad; the other base units of SI do not occur.
 UNITS = {
-    "1": (0, 0, 0, 0),
-    "m": (0, 1, 0, 0),
-    "m/s": (0, 1, -1, 0),
-    "m/s2": (0, 1, -2, 0),
-    "rad": (0, 0, 0, 1),
-    "rad/s": (0, 0, -1, 1),
-    "rad/s2": (0, 0, -2, 1),
-    "kg": (1, 0, 0, 0),
-    "kg.m2": (1, 2, 0, 0),
-    "N": (1, 1, -2, 0),
-    "N.m": (1, 2, -2, 0),
-    "N/m": (1, 0, -2, 0),
-    "N.s/m": (1, 0, -1, 0),
-    "J": (1, 2, -2, 0),
-    "s": (0, 0, 1, 0),
+    "1": (0, 0, 0, 0), "m": (0, 1, 0, 0), "m/s": (0, 1, -1, 0), "m/s2": (0, 1, -2, 0), "rad": (0, 0, 0, 1),
+    "rad/s": (0, 0, -1, 1), "rad/s2": (0, 0, -2, 1), "kg": (1, 0, 0, 0), "kg.m2": (1, 2, 0, 0), "N": (1, 1, -2, 0),
+    "N.m": (1, 2, -2, 0), "N/m": (1, 0, -2, 0), "N.s/m": (1, 0, -1, 0), "J": (1, 2, -2, 0), "s": (0, 0, 1, 0),
     "W": (1, 2, -3, 0),
-}
+}  # fmt: skip
 
 #: Bounds of what every model has, and of what one has.
 COMMON_BOUNDS = {
@@ -89,28 +77,6 @@ BOUNDS = {
 NOT_NEGATIVE = ("kg", "kg.m2", "N/m", "N.s/m")
 
 INPUTS = {model: {name for name, causality, *_ in rows if causality == "input"} for model, rows in ROWS.items()}
-#: What each output depends on at one instant, where that is not every input. A commanded speed that jumps takes the
-#: other freedom's velocity with it, and with it all energies but the potential and the dissipated.
-OF_STATE = {
-    "FiveBarSlider": ["coupler.angle", "rocker.angle", "coupler.point.x", "coupler.point.y"],
-    "SliderCrank": [
-        "shift.position",
-        *(f"{pin}_pin.{axis}" for pin in ("crank", "slider") for axis in "xyz"),
-        "assembly.margin",
-    ],
-}
-OF_STATE_ALWAYS = [
-    *("crank.angle", "slider.position", "energy.potential", "energy.dissipated", "closure.residual"),
-    "transmission.angle",
-]
-OF_SPEED = {"FiveBarSlider": [], "SliderCrank": ["shift.velocity", "rod.wx", "rod.wy", "rod.wz"]}
-OF_SPEED_ALWAYS = ["crank.speed", "slider.velocity", "energy.kinetic", "energy.supplied", "energy.residual"]
-COMMANDS = {"FiveBarSlider": {"drive.speed"}, "SliderCrank": {"drive.speed", "axial.speed"}}
-DEPENDENCIES = {
-    model: {name: set() for name in OF_STATE_ALWAYS + OF_STATE[model]}
-    | dict.fromkeys(OF_SPEED_ALWAYS + OF_SPEED[model], COMMANDS[model])
-    for model in MODELS
-}
 
 
 @pytest.fixture(params=list(KINDS))
@@ -254,16 +220,6 @@ def test_unit_definitions(description: Element, model: Model, kind: str) -> None
     assert displays["rad", "deg"] == pytest.approx(57.29577951308232, rel=1e-15)
     assert displays["rad/s", "rpm"] == pytest.approx(9.549296585513721, rel=1e-15)
     assert displays["m", "mm"] == 1000.0
-
-
-def test_output_dependencies(description: Element, model: Model) -> None:
-    """Of inputs; `test_interface` has those of states."""
-    outputs = [row[0] for row in ROWS[model.name] if row[1] == "output"]
-    declared = read_unknowns(description, "Output")
-    assert list(declared) == outputs
-    assert {name: on & INPUTS[model.name] for name, on in declared.items()} == {
-        name: DEPENDENCIES[model.name].get(name, INPUTS[model.name]) for name in outputs
-    }
 
 
 #: The states that are no outputs, and the derivatives.

@@ -11,7 +11,6 @@ import pytest
 from analysis.export.description import NATIVE, NATIVE_FMI3, PYTHON, Kind, description, traced_dependencies
 from analysis.export.interface import derivatives, indicator, interface, states
 from analysis.mechanisms import FIVE_BAR, SLIDER_CRANK
-from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from linkwork.plant import Plant
@@ -185,12 +184,6 @@ def test_rates_are_time_derivatives(mechanism: Mechanism) -> None:
                 assert values[v.name] == pytest.approx(rates[v.rate_of], rel=1e-6, abs=1e-6), (modes, v.name)
 
 
-def test_event_indicator_is_the_clearance_to_the_limit(mechanism: Mechanism) -> None:
-    entry = interface(mechanism)[indicator(mechanism)]
-    assert entry.role == "indicator"
-    assert f"less {LIMIT_SINE:g}" in entry.variable.description
-
-
 #: Parameters with which the clearance is that from another limit: friction that may jam the links.
 OTHER_LIMIT = {"five-bar": {"slider_friction_coefficient": 1.2}}
 
@@ -284,12 +277,3 @@ def test_nominals_are_the_magnitudes_that_errors_are_measured_by(mechanism: Mech
     for kind in (NATIVE, NATIVE_FMI3):
         scalars = read_scalars(description(mechanism, kind))
         assert {s.name: float(s.attributes["nominal"]) for s in scalars if "nominal" in s.attributes} == expected
-
-
-def test_value_references_are_the_same_in_every_kind(mechanism: Mechanism) -> None:
-    python, native, native_3 = (
-        {s.name: s.reference for s in read_scalars(description(mechanism, kind))}
-        for kind in (PYTHON, NATIVE, NATIVE_FMI3)
-    )
-    assert native == native_3 == native | python
-    assert list(python) == [v.name for v in mechanism.variables]

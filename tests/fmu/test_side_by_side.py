@@ -59,15 +59,17 @@ def test_two_builds_in_one_process(fmu: Path, model: Model, variant: Path, tmp_p
 def test_all_models_in_one_process(fmus: dict[str, Path], tmp_path: Path) -> None:
     names = list(MODELS)
 
-    def ends(folder: str, *names: str) -> Any:
-        values = [MODELS[name].free for name in names]
-        return run_in_process(run_together, [str(fmus[name]) for name in names], tmp_path / folder, values)
+    def ends(folder: str, *each: tuple[str, float]) -> Any:
+        values = [MODELS[name].free | {"slider.damping": damping} for name, damping in each]
+        return run_in_process(run_together, [str(fmus[name]) for name, _ in each], tmp_path / folder, values)
 
-    apart = {name: ends(name, name) for name in names}
-    for order in (names, names[::-1], names * 2):
-        together, late = ends("-".join(order), *order)
-        assert together == [apart[name][0][0] for name in order]
-        assert late == [apart[name][1][0] for name in order]
+    every = [(name, damping) for damping in (10.0, 30.0) for name in names]
+    apart = {one: ends(f"{one}", one) for one in every}
+    for order in (every, every[::-1]):
+        together, late = ends(f"{order[0]}-", *order)
+        assert together == [apart[one][0][0] for one in order]
+        assert late == [apart[one][1][0] for one in order]
+    assert len({str(end) for end in together}) == len(every)
 
 
 def module_path(fmus: list[str], folder: str) -> list[Any]:

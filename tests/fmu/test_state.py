@@ -135,36 +135,6 @@ def test_save_diverge_restore_repeat(fmu: Path, model: Model, tmp_path: Path, va
     assert run_in_process(go_on_elsewhere, fmu, tmp_path / "b", runs["data"]) == runs["first"]
 
 
-def two_instances(fmu: str, folder: str, values: dict[str, float], force: str) -> list[Any]:
-    """Two instances stepped in turn, and each by itself."""
-    from bare_master import Fmu
-
-    fmu = Fmu(fmu, folder)
-    both = [values, values | {"slider.stiffness": 1500.0, "solver.tolerance": 1e-7}]
-
-    def play(instances, inputs=(0.0, 2.0)):
-        for k in range(50):
-            for instance, value in zip(instances, inputs):
-                instance.set(force, value * k / 50)
-                assert instance.step(k * 1e-3, 1e-3) == 0
-        return [instance.outputs() for instance in instances]
-
-    together = play([fmu.instantiate().start(v) for v in both])
-    alone = play([fmu.instantiate().start(both[0])], (0.0,)) + play([fmu.instantiate().start(both[1])], (2.0,))
-    # a failure of one is none of the other's
-    good, bad = (fmu.instantiate().start(values) for _ in range(2))
-    bad.set(force, float("nan"))
-    return [together, alone, [bad.step(0.0, 1e-3), bad.get("solver.status")], [good.step(0.0, 1e-3), good.log]]
-
-
-def test_two_instances_do_not_see_each_other(fmu: Path, model: Model, tmp_path: Path) -> None:
-    together, alone, bad, good = run_in_process(two_instances, fmu, tmp_path, ONE[model.name], model.force)
-    assert together == alone
-    assert together[0] != together[1]
-    assert bad == [2, 2]
-    assert good == [0, []]
-
-
 def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """Outputs of a run, of the same after a reset, and of the defaults after another."""
     from bare_master import ERROR, Fmu

@@ -211,7 +211,7 @@ static Reason cut(void) {
         snprintf(sentence, SENTENCE, "no freedom turns: there is no periodic motion over an angle");
         return INTERNAL;
     }
-    for (int i = 0; i < INPUTS; i++) section.u[i] = a->given[input_at[i]];
+    plant_inputs(a, section.u);
     memcpy(section.x, a->x, sizeof section.x);
     for (int i = 0; i < FREEDOMS; i++) held[i] = mode_of[i] >= 0 && !(freeing[i] >> (int)a->modes[mode_of[i]] & 1);
     for (int c = 0; c < COMMANDS; c++) {
@@ -416,7 +416,7 @@ static double *given_value(int reference) {
 /* What is varied to a value, and how all else changes with it. */
 static bool vary(double value) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)];
-    double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], du[ROOM(INPUTS)], growth[MOST];
+    double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], growth[MOST], change[VARIABLES] = {0};
     int reference = varied.reference;
     memcpy(growth, section.growth, sizeof growth); /* links go on making as many turns */
     *given_value(reference) = found.value = value;
@@ -424,26 +424,11 @@ static bool vary(double value) {
     if (reason == GOOD) reason = cut();
     if (reason != GOOD) return false;
     memcpy(section.growth, growth, sizeof growth);
-    for (int i = 0; i < PARAMETERS; i++) {
-        own[i] = plant.given[parameter_at[i]];
-        down[i] = parameter_at[i] == reference;
-    }
-    for (int i = 0; i < 2 * FREEDOMS; i++) {
-        state[i] = plant.given[initial_at[i]];
-        dstate[i] = initial_at[i] == reference;
-    }
-    for (int i = 0; i < INPUTS; i++) {
-        u[i] = plant.given[input_at[i]];
-        du[i] = input_at[i] == reference;
-    }
-    for (int c = 0; c < COMMANDS; c++)
-        if (commands[c].mode < 0 || plant.modes[commands[c].mode] == commands[c].value) {
-            state[commands[c].rate] = u[commands[c].input];
-            dstate[commands[c].rate] = du[commands[c].input];
-        }
-    equations_begin_forward((const double *[]){plant.modes, own, state, u, down, dstate, du}, (double *[]){varied.p, varied.x},
-                            NULL, NULL, 0);
-    memcpy(varied.u, du, sizeof du);
+    if (reference >= 0) change[reference] = 1.0;
+    plant_split(&plant, plant.given, own, state, u);
+    plant_split(&plant, change, down, dstate, varied.u);
+    equations_begin_forward((const double *[]){plant.modes, own, state, u, down, dstate, varied.u},
+                            (double *[]){varied.p, varied.x}, NULL, NULL, 0);
     for (int i = 0; i < MOTOR; i++) varied.motor[i] = -1 - i == reference;
     varied.x[CRANK] = 0.0;
     for (int i = 2 * FREEDOMS; i < STATES; i++) varied.x[i] = 0.0;

@@ -60,7 +60,7 @@ Reason begin(Plant *a) {
 
 static void joint_places(const Plant *a, double places[ROOM(PLACES)]) {
     double u[ROOM(INPUTS)];
-    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]];
+    plant_inputs(a, u);
     equations_joints((const double *[]){a->x, a->modes, u, a->p}, (double *[]){places}, NULL, NULL, 0);
 }
 
@@ -121,13 +121,11 @@ static double drag_miss(const Plant *a, const Drag *drag, double miss[2]) {
 static bool correction(const Plant *a, const Drag *drag, const double miss[2], double step[2]) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)], slopes[2][2] = {{0}}, matrix[4], largest = 0.0;
     int count = drag->count;
-    for (int i = 0; i < PARAMETERS; i++) own[i] = a->given[parameter_at[i]];
-    for (int i = 0; i < 2 * FREEDOMS; i++) state[i] = a->given[initial_at[i]];
-    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]];
+    plant_split(a, a->given, own, state, u);
     for (int m = 0; m < count; m++) {
-        double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], changes[ROOM(PLACES)];
-        for (int i = 0; i < PARAMETERS; i++) down[i] = parameter_at[i] == drag->moved[m];
-        for (int i = 0; i < 2 * FREEDOMS; i++) dstate[i] = initial_at[i] == drag->moved[m];
+        double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], du[ROOM(INPUTS)], changes[ROOM(PLACES)], change[VARIABLES] = {0};
+        change[drag->moved[m]] = 1.0;
+        plant_split(a, change, down, dstate, du);
         equations_joints_forward((const double *[]){a->modes, own, state, u, down, dstate}, (double *[]){changes}, NULL, NULL,
                                  0);
         for (int i = 0; i < 2; i++)

@@ -433,32 +433,7 @@ def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     px, py = coupler_point(g, p)
     kinetic = kinetic_energy(inertia(g, k, p), w2, v)
     potential = potential_energy(g, u, p)
-    return Outputs(
-        th2,
-        w2,
-        m.crank_acceleration,
-        th3,
-        th4,
-        u,
-        v,
-        m.slider_acceleration,
-        px,
-        py,
-        m.torque,
-        f.ax,
-        f.ay,
-        f.bx,
-        f.by,
-        f.cx,
-        f.cy,
-        f.dx,
-        f.dy,
-        f.guide,
-        kinetic,
-        potential,
-        dissipated,
-        supplied,
-        kinetic + potential - start_energy + dissipated - supplied,
-        closure_residual(th2, th3, th4, u, p),
-        transmission_angle(g, p),
-    )
+    energies = (kinetic, potential, dissipated, supplied, kinetic + potential - start_energy + dissipated - supplied)
+    closure = (closure_residual(th2, th3, th4, u, p), transmission_angle(g, p))
+    slider = (u, v, m.slider_acceleration)
+    return Outputs(th2, w2, m.crank_acceleration, th3, th4, *slider, px, py, m.torque, *f, *energies, *closure)

@@ -407,51 +407,10 @@ def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     turn = rod_angular_velocity(rod(q, p), rate, p)
     kinetic = kinetic_energy(inertia(q, k, p), w, v)
     potential = potential_energy(q, s1, p)
-    return Outputs(
-        th,
-        w,
-        m.crank_acceleration,
-        s1,
-        v,
-        m.shift_acceleration,
-        q.s4,
-        m.slider_velocity,
-        m.slider_acceleration,
-        p2.x,
-        p2.y,
-        p2.z,
-        p3.x,
-        p3.y,
-        p3.z,
-        turn.x,
-        turn.y,
-        turn.z,
-        m.torque,
-        m.force,
-        f.bearing.x,
-        f.bearing.y,
-        f.axial,
-        f.bearing_moment.x,
-        f.bearing_moment.y,
-        f.bearing_moment.z,
-        f.crank_pin.x,
-        f.crank_pin.y,
-        f.crank_pin.z,
-        f.slider_pin.x,
-        f.slider_pin.y,
-        f.slider_pin.z,
-        f.guide.x,
-        f.guide.y,
-        f.guide.z,
-        f.guide_moment.x,
-        f.guide_moment.y,
-        f.guide_moment.z,
-        kinetic,
-        potential,
-        dissipated,
-        supplied,
-        kinetic + potential - start_energy + dissipated - supplied,
-        closure_residual(th, s1, q.s4, p),
-        transmission_angle(q, p),
-        assembly_margin(q, p),
-    )
+    energies = (kinetic, potential, dissipated, supplied, kinetic + potential - start_energy + dissipated - supplied)
+    closure = (closure_residual(th, s1, q.s4, p), transmission_angle(q, p), assembly_margin(q, p))
+    crank, shift = (th, w, m.crank_acceleration), (s1, v, m.shift_acceleration)
+    slider = (q.s4, m.slider_velocity, m.slider_acceleration)
+    bearing = (f.bearing.x, f.bearing.y, f.axial, *f.bearing_moment)
+    joints = (*bearing, *f.crank_pin, *f.slider_pin, *f.guide, *f.guide_moment)
+    return Outputs(*crank, *shift, *slider, *p2, *p3, *turn, m.torque, m.force, *joints, *energies, *closure)
