@@ -446,6 +446,15 @@ def test_the_columns_of_an_untimed_path_are_its_nearest_points(closed) -> None:
         assert at.max() <= 2.0
 
 
+def test_an_open_path_may_be_judged_from_any_number_of_rotations() -> None:
+    # the curve is a part of the linkage's own: the stations lie on it
+    points = LINKAGE.path(np.linspace(0.1, 2.0, 9))
+    task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=False))
+    few, many = (syn.Solution.from_linkage(task, LINKAGE, np.linspace(0.1, 2.0, n)) for n in (2, 50))
+    assert syn.assess(few).dimensions == syn.assess(many).dimensions
+    assert len(figures.plot_sheet(few).axes) == 4
+
+
 def test_what_an_error_in_a_dimension_costs() -> None:
     solution = timed()
     d = 1e-4

@@ -138,10 +138,7 @@ def displacements(solution: Solution) -> dict[str, float]:
     """
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
-    at = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
-    if at is None:
-        at = nearest_rotations(linkage, normal.places)
-    jacobian, _ = _residuals(linkage, normal, at, isinstance(task, UntimedPath))
+    jacobian, _ = _residuals(linkage, normal, solution.station_rotations(), isinstance(task, UntimedPath))
     moved = np.sqrt((jacobian**2).sum(axis=0) / normal.n)
     # a rocker's angle depends neither on the position of the linkage nor on its coupler point
     idle = set(PLACES) - {*LINKS, "crank_phase"} if normal.of_rocker else set(linkage.absent_dimensions)

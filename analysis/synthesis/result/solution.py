@@ -352,12 +352,21 @@ class Solution(NotebookResult):
         """Return the least and the greatest crank rotation of the task; None if the crank can turn fully."""
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 
+    def station_rotations(self) -> FloatArray:
+        """Return the crank rotations of the task's stations; for a path without them, those at which the curve is nearest."""
+        normal, at = normal_form(self.task), self.evaluation.rotation
+        given = normal.rotation if normal.rotation is not None else at
+        if given is not None and len(given) == normal.n:
+            return given
+        ends = () if at is None or normal.closed else (float(at.min()), float(at.max()))
+        return nearest_rotations(self.linkage, normal.places, *ends)
+
     def straight(self) -> StraightPart | None:
         """Return the straight part of the task as the linkage traces it; None if the task has none."""
         asked = normal_form(self.task).straight
-        rotation = self.evaluation.rotation
-        if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
+        if asked is None or self.evaluation.rotation is None or not isinstance(self.task, UntimedPath):
             return None
+        rotation = self.station_rotations()
         begin, end = float(rotation[asked.start]), float(rotation[asked.end])
         own = self.task.straight
         assert own is not None
