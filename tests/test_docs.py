@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 from analysis import cli
 from analysis.mechanisms import PUBLISHED
-from analysis.studies import RAHMAN, STUDIES, YOUSSEF
+from analysis.studies import STUDIES
 from analysis.studies.contents import sentences
 from analysis.studies.page import MOST_BYTES, quotes
 from analysis.studies.statements import FAILS, HOLDS, IN_PART
@@ -51,13 +51,13 @@ def test_every_mechanism_has_its_tables(generate):
     assert {table for table, _ in marked} == set(generate.TABLES)
 
 
-@pytest.mark.parametrize(("name", "studies"), [("youssef.md", YOUSSEF), ("rahman.md", RAHMAN)])
-def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name, studies):
+@pytest.mark.parametrize("name", ["youssef.md", "rahman.md"])
+def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name):
     page = (ROOT / "docs" / name).read_text()
-    for number, title in studies.items():
-        assert title in page, f"{number}: run make docs FIGURES=1"
     parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
-    assert set(parts[1::2]) == set(studies)
+    ours = {number for number in STUDIES if number.startswith(("R", "rahman-")) == (name == "rahman.md")}
+    assert set(parts[1::2]) == ours, "run make docs FIGURES=1"
+    assert all(STUDIES[number] in page for number in ours), "run make docs FIGURES=1"
     for number, part in zip(parts[1::2], parts[2::2]):
         verdicts = {quote: outcome for quote, outcome in quotes(part) if outcome != HOLDS}
         assert len(verdicts) == len(expected(number)), "run: make docs FIGURES=1"

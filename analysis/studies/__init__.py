@@ -24,16 +24,10 @@ if TYPE_CHECKING:
 #: All figures of both theses by number, in order, including those that only show a mechanism or an apparatus.
 ENTRIES: Mapping[str, Entry] = MappingProxyType({**_YOUSSEF, **_RAHMAN})
 
-#: Title of each study of Youssef's thesis by its number there, and of the pictures of the linkage.
-YOUSSEF: Mapping[str, str] = MappingProxyType(
-    {number: entry.title for number, entry in _YOUSSEF.items() if entry.module}
+#: Title of each study by its number; that of a figure of Rahman's has an R before it.
+STUDIES: Mapping[str, str] = MappingProxyType(
+    {number: entry.title for number, entry in ENTRIES.items() if entry.module}
 )
-
-#: Title of each study of Rahman's thesis by the figure's number there with an R before it.
-RAHMAN: Mapping[str, str] = MappingProxyType({number: entry.title for number, entry in _RAHMAN.items() if entry.module})
-
-#: Title of each study.
-STUDIES: Mapping[str, str] = MappingProxyType({**YOUSSEF, **RAHMAN})
 
 
 def is_figure(number: str) -> bool:

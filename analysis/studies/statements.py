@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import partial
 from typing import NamedTuple, SupportsFloat
 
 import numpy as np
@@ -35,14 +36,8 @@ class Source(NamedTuple):
         return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
 
 
-def text(place: str) -> Source:
-    """Return the source of a statement in the thesis's text, given its place there."""
-    return Source(TEXT, place)
-
-
-def listing(place: str) -> Source:
-    """Return the source of a statement that the thesis's program prints, given the place of its listing in the thesis."""
-    return Source(LISTING, place)
+#: Sources of statements by their place in the thesis: in its text, and printed by the program of a listing there.
+text, listing = partial(Source, TEXT), partial(Source, LISTING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

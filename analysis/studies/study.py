@@ -125,6 +125,9 @@ def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float6
     return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
 
 
-def result_curves(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
-    """Return columns of a result as curves over the column ``x``; ``names`` maps the name of each column to its label."""
-    return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]
+def result_curves(result: StudyResult, x: str, names: Mapping[str, str], **look: Any) -> list[Curve]:
+    """Return columns of a result as curves over the column ``x``; ``names`` maps the name of each column to its label.
+
+    ``look`` are further attributes that all curves share.
+    """
+    return [Curve(x=result.columns[x], y=result.columns[name], label=label, **look) for name, label in names.items()]

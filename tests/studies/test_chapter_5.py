@@ -141,11 +141,9 @@ def galerkin(inertia_ratio: float, harmonics: int) -> NDArray[np.float64]:
     psi1, rest, factor = (cut(v / e.mass(x)) for v in (e.mass.derivative()(x), e.stiffness(x), 1.0))
     k = np.array([[0.5], [1.5]])
     cos, sin = np.cos(k * x), np.sin(k * x)
-    terms, slopes, curvatures = (
-        np.vstack([cos, sin]),
-        np.vstack([-k * sin, k * cos]),
-        np.vstack([-(k**2) * cos, -(k**2) * sin]),
-    )
+    terms = np.vstack([cos, sin])
+    slopes = np.vstack([-k * sin, k * cos])
+    curvatures = np.vstack([-(k**2) * cos, -(k**2) * sin])
     left = terms @ (curvatures + psi1 * slopes + rest * terms).T
     return np.sort(np.linalg.eigvals(np.linalg.solve(terms @ (factor * terms).T, -left)).real)
 

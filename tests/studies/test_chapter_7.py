@@ -84,11 +84,10 @@ def test_cam() -> None:
     assert found.curvature == pytest.approx(1.0 / turned.max(), rel=1e-3)
 
 
-# Goals: sums of squared errors at N = 24 over the weight (deg2), areas (cm2), by the number of harmonics, the printed links
-# kept. The thesis prints 4.8 and 4.3 for two
-ROCKER_GOAL = {2: 0.76}
+# Goals: areas (cm2) by the number of harmonics, the printed links kept. The thesis prints 4.3 for two
 PATH_GOAL = {2: 4.05, 3: 3.05, 5: 2.35}
-# Best known: a change for the worse of a search shows here first
+# Best known sums of squared errors at N = 24 over the weight (deg2), of which the thesis prints 4.8 for two: a search that
+# gets worse shows here first
 ROCKER_BEST = {1: 2.334, 2: 0.7221, 3: 0.4896}
 
 
@@ -132,14 +131,11 @@ def area(linkage: Linkage) -> float:
 class TestGoals:
     """What is to be reached with the printed links kept."""
 
-    def test_the_angle_with_two_harmonics(self) -> None:
-        error = linkage_error(ROCKER, rocker_motion(2).linkage)
-        assert error <= ROCKER_GOAL[2]
-        assert weighted_error(rocker_motion(2).linkage) == pytest.approx(error, rel=1e-9)
-
     @pytest.mark.parametrize("harmonics", ROCKER_BEST)
     def test_the_angle_is_the_best_known(self, harmonics: int) -> None:
-        assert weighted_error(rocker_motion(harmonics).linkage) <= ROCKER_BEST[harmonics]
+        error = linkage_error(ROCKER, rocker_motion(harmonics).linkage)
+        assert weighted_error(rocker_motion(harmonics).linkage) == pytest.approx(error, rel=1e-9)
+        assert error <= ROCKER_BEST[harmonics]
 
     def test_defects_and_strokes(self) -> None:
         motions = [rocker_motion(n) for n in (1, 2, 3)] + [path_motion(n) for n in PATH_SEARCHES]

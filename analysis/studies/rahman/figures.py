@@ -271,10 +271,8 @@ def _bearing_moments() -> tuple[Statement, ...]:
     rates = joint_rates(CRANK_AT_SPEED, GENERAL)
     seconds = joint_accelerations(CRANK_AT_SPEED, GENERAL, rates)
     forces = joint_forces(CRANK_AT_SPEED, bodies(parameters()), GENERAL, rates, seconds, TORQUE)
-    (i, j), (about_i, about_j) = (
-        crank_bearing_forces(np.array(0.9), forces),
-        bearing_moments(np.array(0.9), 3.5, forces),
-    )
+    i, j = crank_bearing_forces(np.array(0.9), forces)
+    about_i, about_j = bearing_moments(np.array(0.9), 3.5, forces)
     by_hand = (nothing("1T1i; 69q", about_i + j * 3.5, "lb.in"), nothing("1T1j; 69p", about_j - i * 3.5, "lb.in"))
     by_forces = [
         nothing(

@@ -99,11 +99,9 @@ def _condition(case: Case) -> float:
 
     The corrections are those of `turn`, up to the first angle at which they do not become small.
     """
-    p, shift, unit = (
-        parameters(case.offset_in, case.twist_deg),
-        np.array([case.shift_in * INCH]),
-        np.array([1.0] * 4 + [INCH]),
-    )
+    p = parameters(case.offset_in, case.twist_deg)
+    shift = np.array([case.shift_in * INCH])
+    unit = np.array([1.0] * 4 + [INCH])
     unknowns, least = planar(p, np.radians(GRID_DEG[:1])), np.inf
     for angle in np.radians(GRID_DEG):
         for _ in range(MAX_STEPS):

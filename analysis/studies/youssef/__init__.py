@@ -15,12 +15,7 @@ from ..contents import Entry
 #: nothing to compute), the place in the thesis, and the title.
 _ROWS = (
     ("3.1", "formulation", "II, 3.1, L554-1804", "The linkage with its loads: equations and integration"),
-    (
-        "3.2",
-        "chapter_3",
-        "3.2.1, L1871",
-        "Slider without a spring, five dampers; Table 3.1, 420 rpm",
-    ),
+    ("3.2", "chapter_3", "3.2.1, L1871", "Slider without a spring, five dampers; Table 3.1, 420 rpm"),
     ("3.3", "chapter_3", "3.2.1, L1925", "Slider without spring and gravity, five dampers; Table 3.1, 420 rpm"),
     ("3.4", "chapter_3", "3.2.1, L1936", "Slider over the crank angle, three springs; Table 3.1, 420 rpm"),
     ("3.5", "chapter_3", "3.2.1, L1987", "Torque that holds the speed, three springs; Table 3.1, 420 rpm"),

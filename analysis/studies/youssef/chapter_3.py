@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import mean_effective_mass
 from ...run import Inputs, Trajectory, simulate
@@ -17,7 +15,7 @@ from ...youssef import balance
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ_DEG, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns, result_curves
-from ..variation import cache, compared_values
+from ..variation import cache
 from . import free_crank, launches, no_spring
 from .runs import (
     ALIKE_WORDS,
@@ -56,14 +54,16 @@ def _steady(stiffness: float) -> SteadyTurn:
     return steady_turn(table_3_1(stiffness), SPEED)
 
 
-def springs() -> tuple[float, ...]:
-    """Return the spring stiffnesses (dyn/cm) that Fig 3.4 compares, or only the reader's stiffness if the reader has set it."""
-    return compared_values("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
+def transient(stiffness: float, number: int = 0) -> float:
+    """Return the greatest distance of u from the steady motion in a turn after the start, relative to the range of u."""
+    steady = _steady(stiffness).slider_cm
+    started = CM_PER_METRE * run_from_rest(stiffness)["slider.position"][360 * number : 360 * (number + 1)]
+    return float(np.abs(started - steady[:-1:4]).max() / np.ptp(steady))
 
 
 def steady_result() -> StudyResult:
     """Compute the motion from rest and the steady turn with each spring."""
-    turns = {k: _steady(k) for k in springs()}
+    turns = {k: _steady(k) for k in STIFFNESSES}
     columns = {ANGLE: next(iter(turns.values())).angle_deg}
     columns |= {f"slider position u; {_k(k)} [cm]": turn.slider_cm for k, turn in turns.items()}
     starts = {k: run_from_rest(k) for k in turns}
@@ -74,8 +74,7 @@ def steady_result() -> StudyResult:
         claim="After a transient of one turn the slider oscillates steadily between its start and the crank shaft. A "
         "stiffer spring moves the mean position towards the start, and the least position to a smaller crank angle.",
         columns=pad_columns(columns),
-        # the statements compare the three springs
-        statements=(*_steady_statements(), *_shape_statements()) if springs() == STIFFNESSES else (),
+        statements=(*_steady_statements(), *_shape_statements()),
     )
 
 
@@ -84,14 +83,9 @@ def _steady_statements() -> list[Statement]:
     turns = {k: _steady(k) for k in STIFFNESSES}
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
-    first, second = (
-        {k: np.abs(u[k] - turn.slider_cm[:-1:4]).max() / np.ptp(turn.slider_cm) for k, turn in turns.items()}
-        for u in ({k: CM_PER_METRE * run_from_rest(k)["slider.position"][n : n + 360] for k in turns} for n in (0, 360))
-    )
-    change, shaft = (
-        max(t.change / np.ptp(t.slider_cm) for t in turns.values()),
-        -CM_PER_METRE * table_3_1(0.0).ground_length,
-    )
+    first, second = ({k: transient(k, number) for k in turns} for number in (0, 1))
+    change = max(t.change / np.ptp(t.slider_cm) for t in turns.values())
+    shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     later = "with the softer springs the transient lasts longer"
     return [
         Statement(
@@ -195,10 +189,7 @@ def _shape_statements() -> list[Statement]:
                 at_most("width, greatest", 1.0, greatest_ratio(widths)),
                 at_least("growth of the spring's share, least", 0.0, np.diff(shares).min()),
                 at_least(
-                    f"spring's share; {_k(2e6)}",
-                    1.0,
-                    shares[-1],
-                    why="the inertia force is greater than the spring's",
+                    f"spring's share; {_k(2e6)}", 1.0, shares[-1], why="the inertia force is greater than the spring's"
                 ),
             ),
         ),
@@ -220,8 +211,8 @@ def _shape_statements() -> list[Statement]:
 def draw_steady(result: StudyResult) -> Figure:
     """Draw the motion over three turns from the start, and one steady turn per spring with a cross at its least position."""
     columns = result.columns
-    from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in springs()}
-    names = [f"slider position u; {_k(k)} [cm]" for k in springs()]
+    from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in STIFFNESSES}
+    names = [f"slider position u; {_k(k)} [cm]" for k in STIFFNESSES]
     crosses = []
     for colour, name in zip(COLOURS, names):
         place, value = least(columns[ANGLE][:1441], columns[name][:1441])
@@ -312,19 +303,10 @@ def graph_distance(x: NDArray[np.float64], one: NDArray[np.float64], other: NDAr
 
     Both curves have the abscissas ``x`` and the period 1.
     """
-    points = x + 1j * one
-    line = np.concatenate([(x[:-1] + shift) + 1j * other[:-1] for shift in (-1.0, 0.0, 1.0)])
-    starts, steps = line[:-1], np.diff(line)
-    return np.array([_least_distance(point - starts, steps) for point in points])
+    import shapely
 
-
-def _least_distance(offsets: NDArray[np.complex128], steps: NDArray[np.complex128]) -> float:
-    """Return the distance of a point from the nearest of several line segments.
-
-    ``offsets`` lead from the start of each segment to the point, ``steps`` from the start of each segment to its end.
-    """
-    shares = np.clip((offsets * steps.conj()).real / np.abs(steps) ** 2, 0.0, 1.0)
-    return float(np.abs(offsets - shares * steps).min())
+    line = [np.column_stack([x[:-1] + shift, other[:-1]]) for shift in (-1.0, 0.0, 1.0)]
+    return np.asarray(shapely.distance(shapely.points(x, one), shapely.LineString(np.concatenate(line))))
 
 
 def torque_result() -> StudyResult:
@@ -502,7 +484,7 @@ def draw_torque(result: StudyResult) -> Figure:
 
 #: The studies by number.
 STUDIES = {
-    "3.4": Study(steady_result, draw_steady),
+    "3.4": Study(steady_result, draw_steady, sweeps=("slider.stiffness",)),
     "3.5": Study(torque_result, draw_torque, sweeps=("slider.stiffness",)),
     **no_spring.STUDIES,
     **launches.STUDIES,

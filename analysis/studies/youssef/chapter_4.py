@@ -350,10 +350,7 @@ def compute_deviation() -> StudyResult:
                 "deviation of the lower root from omega_k, by the right equation: its distance from the straight line "
                 "through zero and its value at I4 = 1.5 (our choice), relative to that value; then the deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
-                (
-                    at_most("distance from the line", ALIKE, bent),
-                    near("at I4 = 0", 0.0, found[0], 1e-6, "rad/s"),
-                ),
+                (at_most("distance from the line", ALIKE, bent), near("at I4 = 0", 0.0, found[0], 1e-6, "rad/s")),
             ),
             Statement(
                 "In fact for the case [I4]=0 the equation of motion of the slider reduces to a second order linear "

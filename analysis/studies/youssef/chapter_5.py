@@ -92,12 +92,7 @@ def compute_sweep(number: str) -> StudyResult:
     for way, these in found.items():
         columns[f"lambda_k^2; {way}; low [1]"] = np.array([region.low for region in these])
         columns[f"lambda_k^2; {way}; high [1]"] = np.array([region.high for region in these])
-    return StudyResult(
-        claim=sweep.claim,
-        assignment=sweep.assignment,
-        columns=columns,
-        statements=sweep.judge(found),
-    )
+    return StudyResult(claim=sweep.claim, assignment=sweep.assignment, columns=columns, statements=sweep.judge(found))
 
 
 def draw_sweep(result: StudyResult) -> Figure:

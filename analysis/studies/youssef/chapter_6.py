@@ -36,7 +36,7 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
-from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_function
+from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_angle_deg, rocker_function
 from .stated_errors import ROUNDED, judge_stated_error, printed_error, rounding_range
 
 FloatArray = NDArray[np.float64]
@@ -299,9 +299,7 @@ TABLE = {
         "on the rocker, is ours.",
     ),
     "6.9": Row(
-        "path-a",
-        "A four-bar traces path (a), whatever its timing, with an area of 2.3 cm2 between the curves.",
-        _paths,
+        "path-a", "A four-bar traces path (a), whatever its timing, with an area of 2.3 cm2 between the curves.", _paths
     ),
     "6.10": Row(
         "path-b",
@@ -432,7 +430,7 @@ def rocker_columns(name: str) -> dict[str, FloatArray]:
     if name == "rocker-weighted":
         linkages["mounted"], tasks["mounted"] = mounted_solution().linkage, replace(p.task, mounting=True)
     phi = np.linspace(0.0, 2.0 * pi, 361)
-    target = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
+    target = rocker_angle_deg(phi)
     columns = {"crank rotation [deg]": np.degrees(phi), "target angle [deg]": target}
     for who, linkage in linkages.items():
         angle = np.degrees(linkage.rocker_angle(phi))
@@ -450,20 +448,19 @@ def draw_rocker(result: StudyResult) -> Figure:
     """Draw rocker angles, errors, and the least error for each bound on the transmission angle."""
     c = result.columns
     labels = {"printed": "printed linkage", "ours": "our linkage", "mounted": "ours, mounting free"}
-    look = dict(zip(labels, COLOURED))
-    over_turn = {"x_label": "crank rotation [deg]", "x_ticks": range(0, 361, 60)}
+    look, over_turn, by_angle = dict(zip(labels, COLOURED)), "crank rotation [deg]", "least transmission angle [deg]"
     curves = {
         what: [
-            Curve(x=c["crank rotation [deg]"], y=c[f"{who} {what} [deg]"], label=label, colour=look[who])
+            Curve(x=c[over_turn], y=c[f"{who} {what} [deg]"], label=label, colour=look[who])
             for who, label in labels.items()
             if f"{who} {what} [deg]" in c
         ]
         for what in ("angle", "error")
     }
-    target = Curve(x=c["crank rotation [deg]"], y=c["target angle [deg]"], label="target", colour=TARGET, line="--")
+    target = Curve(x=c[over_turn], y=c["target angle [deg]"], label="target", colour=TARGET, line="--")
     trade_offs = [
         Curve(
-            x=c["least transmission angle [deg]"],
+            x=c[by_angle],
             y=c[f"{who} least error [deg2]"],
             label=f"mounting {'free' if who == 'mounted' else 'fixed'}",
             colour=colour,
@@ -474,25 +471,19 @@ def draw_rocker(result: StudyResult) -> Figure:
     ]
     panels = [
         Panel(
-            y_label="rocker angle [deg]",
-            title="rocker angle",
-            curves=[target, *curves["angle"]],
-            legend_at="lower center",
-            **over_turn,  # type: ignore[arg-type]
-        ),
-        Panel(
-            y_label="rocker angle less target [deg]",
-            title="error over a turn",
-            curves=curves["error"],
-            **over_turn,  # type: ignore[arg-type]
-        ),
-        Panel(
-            x_label="least transmission angle [deg]",
-            y_label="least error [deg$^2$]",
-            title="error against transmission angle",
-            curves=trade_offs,
-            logarithmic="y",
-        ),
+            x_label=x_label,
+            y_label=y_label,
+            title=title,
+            curves=shown,
+            legend_at=legend_at,
+            x_ticks=None if shown is trade_offs else range(0, 361, 60),
+            logarithmic="y" if shown is trade_offs else "",
+        )
+        for x_label, y_label, title, shown, legend_at in (
+            (over_turn, "rocker angle [deg]", "rocker angle", [target, *curves["angle"]], "lower center"),
+            (over_turn, "rocker angle less target [deg]", "error over a turn", curves["error"], "best"),
+            (by_angle, "least error [deg$^2$]", "error against transmission angle", trade_offs, "best"),
+        )
     ]
     return plot_curves(panels, title=result.heading, columns=3, size=(3.9, 3.6))
 

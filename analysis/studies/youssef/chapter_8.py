@@ -49,11 +49,7 @@ class Turns:
         columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(rigs.slider(next(iter(turns.values())))))}
         columns |= {f"slider position u; {name} [cm]": rigs.slider(found) for name, found in turns.items()}
         return StudyResult(
-            claim=self.claim,
-            assignment=self.assignment,
-            columns=columns,
-            statements=self.statements(),
-            see=self.see,
+            claim=self.claim, assignment=self.assignment, columns=columns, statements=self.statements(), see=self.see
         )
 
     def draw(self, result: StudyResult) -> Figure:
@@ -251,10 +247,8 @@ def _least_rise(spring: str, speeds: Sequence[float]) -> float:
 
 
 def _fig_8_15() -> tuple[Statement, ...]:
-    at_500, shoulder = (
-        rigs.turn("A", 500.0),
-        "the point of inflection has not reached the third peak; a shoulder is left",
-    )
+    at_500 = rigs.turn("A", 500.0)
+    shoulder = "the point of inflection has not reached the third peak; a shoulder is left"
     u = rigs.slider(at_500)
     return (
         Statement(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
-from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +16,14 @@ from ...periodic import natural_frequency
 from ...youssef import HarmonicMotion, harmonic_balance, resonance, slider_equation
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from .chapter_4 import AT_PEAKS, DAMPERS, range_above
+from .chapter_4 import AT_PEAKS, DAMPERS, INERTIA_RATIOS, OMEGA_K, range_above
 from .chapter_5 import with_held_angles, with_same_ground
 from .linearised import with_crank
 from .regions import axis, hill_region, removing_estimate
+from .runs import SIGN
 
-OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
-#: Inertia ratios of the stability, and of the resonance with its dampers omega_c (1/s) and speeds (rad/s).
-RATIOS, RESONANT = (0.25, 0.5, 1.0, 1.5, 2.0), (0.5, 1.0, 1.5)
+#: Inertia ratios of the stability; dampers omega_c (1/s) and speeds (rad/s) of the resonance.
+RATIOS = (0.25, 0.5, 1.0, 1.5, 2.0)
 WEAK, STRONG = DAMPERS[0], DAMPERS[-1]
 SPEEDS = np.unique(np.append(np.arange(10.0, 45.0, 0.05), AT_PEAKS[AT_PEAKS > 10.0]).round(3))
 #: Lengths of crank and coupler relative to the rocker's, in the ranges of Fig 5.2 and 5.3.
@@ -35,7 +34,6 @@ LARGE = 0.05
 RIGHT = "right linear equation"
 SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05, closer at the resonances (our choice)"
 DAMPERS_WORDS = f"omega_c = {WEAK:g} and {STRONG:g} 1/s (Fig 4.6)"
-SIGN = "none, the sign decides"
 
 
 @cache
@@ -75,7 +73,7 @@ def oscillator_differences(inertia_ratio: float) -> tuple[float, float]:
 
 def judge_oscillator(why: str = "") -> tuple[Case, ...]:
     """Judge whether the slider moves as a damped oscillator does; see `oscillator_differences`."""
-    found = np.max([oscillator_differences(i) for i in RESONANT], axis=0)
+    found = np.max([oscillator_differences(i) for i in INERTIA_RATIOS], axis=0)
     return tuple(at_most(name, ABOUT, x, why=why) for name, x in zip(("first harmonic", "both harmonics"), found))
 
 
@@ -164,7 +162,7 @@ def judge_linearised() -> tuple[Statement, ...]:
 
 def _on_resonance() -> tuple[Statement, ...]:
     """Judge the conclusions on the motion of the slider with a short crank."""
-    each = [(i, damper) for i in RESONANT for damper in (WEAK, STRONG)]
+    each = [(i, damper) for i in INERTIA_RATIOS for damper in (WEAK, STRONG)]
     first, second = ({which: harmonic(n, *which) for which in each} for n in (1, 2))
     five = {which: [harmonic(n, *which, 5) for n in range(1, 6)] for which in each}
     # of the second harmonic, and of the third to fifth, to the first
@@ -179,7 +177,7 @@ def _on_resonance() -> tuple[Statement, ...]:
     speeds = np.array([resonance(chapter_4(i))[0] for i in RATIOS])
     bend = np.abs(speeds - np.polyval(np.polyfit(RATIOS, speeds, 1), RATIOS)).max() / np.ptp(speeds)
     # by damper, then by inertia
-    curves = [[first[i, damper] for i in RESONANT] for damper in (WEAK, STRONG)]
+    curves = [[first[i, damper] for i in INERTIA_RATIOS] for damper in (WEAK, STRONG)]
     tops = np.array([[curve.max() for curve in row] for row in curves])
     wide = np.array([[range_above(LARGE, SPEEDS, curve) for curve in row] for row in curves])
     half = [range_above(0.5 * curve.max(), SPEEDS, curve) for curve in curves[-1]]

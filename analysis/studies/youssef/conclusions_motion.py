@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from functools import cache
-from math import asin, degrees, pi
+from math import asin, degrees
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...run import Event, Inputs, simulate
-from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SEEN_FALL, SMALL
 from ..statements import Statement, at_least, at_most, near, text
-from .chapter_3 import graph_distance, run_from_rest
+from .chapter_3 import graph_distance, transient
 from .formulation import judge_closure
 from .free_crank import Turns
 from .launches import TORQUES, launch, run_acceleration, run_peak
 from .multipliers import judge_multipliers
-from .no_spring import COLLINEAR_SINE, DAMPINGS, FEWEST_TURNS, TRANSIENT_TURNS, drift
-from .runs import PERIOD, SPEED, STIFFNESSES, plain, steady_turn, table_3_1
+from .no_spring import COLLINEAR_SINE, DAMPINGS, DRIFT_TURNS, FEWEST_TURNS, TRANSIENT_TURNS, drift
+from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 
 #: Launches of Fig 3.6 and 3.9: torque (dyn.cm) and spring (dyn/cm); those that get collinear without a damper.
 LAUNCHES = (*((torque, 1e6) for torque in TORQUES), (1e8, 5e5), (1e8, 2e6))
 FOLDING = ((2e8, 1e6), (1e8, 5e5))
 #: The damper of a launch (dyn.s/cm), and how long its free motion is followed (s): ten turns of the slowest.
 DAMPED, FREE = 3e4, 3.0
-#: Turns that are run at most without a spring.
-MOST_TURNS = 80
 
 
 def maxima_spacings(angle: NDArray[np.float64], rate: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -53,25 +49,6 @@ def decay(torque: float, stiffness: float, damping: float) -> float:
     swing = ranges_of_turns(torque, stiffness, damping)
     half = swing.size // 2
     return float(swing[half:].mean() / swing[:half].mean())
-
-
-def collinear_turn(damping: float) -> float:
-    """Return the turn at which the links become collinear without a spring, as in Fig 3.2, or NaN.
-
-    The mechanism is Table 3.1 at 420 rpm with a damper (dyn.s/cm).
-    """
-    angle = asin(COLLINEAR_SINE)
-    run = simulate(
-        table_3_1(0.0, damping),
-        Inputs(speed=SPEED * RAD_S_PER_RPM),
-        stop_time=MOST_TURNS * PERIOD,
-        step=PERIOD,
-        events=tuple(
-            Event(name=str(sign), output="transmission.angle", level=level, direction=sign)
-            for level, sign in ((angle, -1), (pi - angle, 1))
-        ),
-    )
-    return run.events[0].time / PERIOD if run.events else np.nan
 
 
 def judge_equations() -> tuple[Statement, ...]:
@@ -105,11 +82,6 @@ def judge_constant_speed() -> tuple[Statement, ...]:
     """Judge the conclusions on the motion at a constant speed of the crank."""
     seen, differs = springs_on_torque()
     steady = {k: steady_turn(table_3_1(k), SPEED) for k in STIFFNESSES}
-    starts = [
-        np.abs(CM_PER_METRE * run_from_rest(k)["slider.position"][:360] - steady_k.slider_cm[:-1:4]).max()
-        / np.ptp(steady_k.slider_cm)
-        for k, steady_k in steady.items()
-    ]
     return (
         Statement(
             "It was found that the spring stiffness had little effect on the torque required to drive the mechanism.",
@@ -130,7 +102,7 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             "the next after 8 s (our choice); both relative to the range of the steady motion, at 420 rpm",
             f"{ALIKE:g}, the rule for *steady*: more than this for a transient, at most this for periodic oscillations",
             (
-                at_least("transient, least of the springs", ALIKE, min(starts)),
+                at_least("transient, least of the springs", ALIKE, min(map(transient, STIFFNESSES))),
                 *(
                     at_most(f"periodic; k = {plain(k)} dyn/cm", ALIKE, steady_k.change / np.ptp(steady_k.slider_cm))
                     for k, steady_k in steady.items()
@@ -145,7 +117,7 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             "of the turns from a line, as at L1911; number of turns until coupler and rocker are within "
             f"{degrees(asin(COLLINEAR_SINE)):.1f} deg of a straight line (our choice)",
             f"{ALIKE:g}, the rule for *steady* and *linear*; {FEWEST_TURNS} turns, two for the transient and two to compare; "
-            f"{MOST_TURNS} turns, as many as we run",
+            f"{DRIFT_TURNS} turns, as many as we run",
             (
                 at_least(
                     f"oscillation and shift; mu = {plain(DAMPINGS[0])} dyn.s/cm, turns until collinear",
@@ -162,7 +134,12 @@ def judge_constant_speed() -> tuple[Statement, ...]:
                     at_most(f"shift; mu = {plain(x)} dyn.s/cm", ALIKE, drift(x).bend, why="it accelerates")
                     for x in DAMPINGS[1:]
                 ),
-                at_most("turns until collinear, the most", MOST_TURNS, max(map(collinear_turn, DAMPINGS)), "turns"),
+                at_most(
+                    "turns until collinear, the most",
+                    DRIFT_TURNS,
+                    max(drift(x).collinear_turn for x in DAMPINGS),
+                    "turns",
+                ),
             ),
         ),
     )

@@ -32,7 +32,7 @@ from ...synthesis import Linkage, MachineSpec, SecondCrank, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, READ, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
-from ..study import Study, StudyResult, pad_columns
+from ..study import Study, StudyResult, pad_columns, result_curves
 from .chapter_6 import ratios_to_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
@@ -429,10 +429,11 @@ def draw(result: StudyResult) -> Figure:
             x_label="crank angle [deg]",
             y_label="control force [N]",
             title="force on the slider",
-            curves=[
-                Curve(x=c["crank angle [deg]"], y=c[f"force; {name} [N]"], label=name)
-                for name in ("without a spring", "with the best spring")
-            ],
+            curves=result_curves(
+                result,
+                "crank angle [deg]",
+                {f"force; {name} [N]": name for name in ("without a spring", "with the best spring")},
+            ),
             x_ticks=range(0, 361, 60),
         ),
         Panel(
@@ -449,15 +450,12 @@ def draw(result: StudyResult) -> Figure:
             x_label="trial cycle",
             y_label="rms deviation [mm]",
             title="trial cycles",
-            curves=[
-                Curve(
-                    x=c["trial cycle [1]"],
-                    y=c[f"rms deviation; {n} harmonics [mm]"],
-                    label=f"{n} harmonics",
-                    marker="o",
-                )
-                for n in HARMONICS
-            ],
+            curves=result_curves(
+                result,
+                "trial cycle [1]",
+                {f"rms deviation; {n} harmonics [mm]": f"{n} harmonics" for n in HARMONICS},
+                marker="o",
+            ),
             logarithmic="y",
         ),
         Panel(

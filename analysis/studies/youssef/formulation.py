@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from ...figures import Figure, Panel, plot_curves
@@ -70,13 +70,18 @@ class Integrated(NamedTuple):
         return float(f"{self.errors[1] / self.unseen:.0e}")
 
 
+def _by_hamming(f: Callable[..., Any], start: ArrayLike, step: float, stop: float = STOP, *args: int) -> Any:
+    """Integrate y' = f(t, y) by Hamming's method with a constant step (s), without control of the error."""
+    options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
+    return solve_ivp(f, (0.0, stop), start, args=args, **options)
+
+
 @cache
 def integrate_both(step: float) -> Integrated:
     """Integrate the motion from rest by the two approaches of section 3.1, by Hamming's method with a constant step (s)."""
-    options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
     q, qd = closed_loop_state(0.0, 0.0, OMEGA, 0.0)
     first, second = (
-        solve_ivp(f, (0.0, STOP), start, **options)
+        _by_hamming(f, start, step)
         for f, start in ((all_derivatives, [*q[1:], *qd[1:]]), (slider_derivatives, [0.0, 0.0]))
     )
     error, other = (
@@ -112,9 +117,8 @@ def integrate_launch(step: float, power: int = 1) -> tuple[float, tuple[float, f
     The errors are the greatest errors by the first and by the second approach, as in `Integrated`. The power is that of
     `bar_torque`.
     """
-    options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9, "args": (power,)}
     first, second = (
-        solve_ivp(f, (0.0, STOP), start, **options)
+        _by_hamming(f, start, step, STOP, power)
         for f, start in (
             (launch_derivatives, np.concatenate(closed_loop_state(0.0, 0.0, 0.0, 0.0))),
             (reduced_launch_derivatives, np.zeros(4)),
@@ -200,7 +204,7 @@ def integrate_by_runge_kutta(
     q, qd = closed_loop_state(0.0, 0.0, OMEGA, 0.0)
     f, start = (all_derivatives, [*q[1:], *qd[1:]]) if first else (slider_derivatives, [0.0, 0.0])
     n = round(STOP / step)
-    return runge_kutta(f, start, STOP / n, n, stages).states
+    return runge_kutta(f, start, STOP / n, n, stages)
 
 
 def integration_error(u: NDArray[np.float64]) -> float:
@@ -238,16 +242,7 @@ def evaluations_a_step() -> float:
     """Count the evaluations of the accelerations in one step of Hamming's method; those of the starting steps do not count."""
     counts = []
     for stop in (0.4, 0.5):
-        found = solve_ivp(
-            slider_derivatives,
-            (0.0, stop),
-            [0.0, 0.0],
-            method=Hamming,
-            first_step=1e-3,
-            max_step=1e-3,
-            rtol=1e3,
-            atol=1e9,
-        )
+        found = _by_hamming(slider_derivatives, [0.0, 0.0], 1e-3, stop)
         counts.append((found.nfev, len(found.t)))
     (fewer, short), (more, long) = counts
     return float((more - fewer) / (long - short))
@@ -265,12 +260,7 @@ def compute() -> StudyResult:
         assignment="The integrations are those of Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm (our choice), for "
         f"{STOP:g} s from u = u' = 0 in constant steps, at 420 rpm or in a launch from rest with T0 = 1e8 dyn.cm.",
         columns=columns,
-        statements=(
-            *chapter_2_statements(),
-            *_closure_statements(),
-            *_one_step_statements(),
-            *_hamming_statements(),
-        ),
+        statements=(*chapter_2_statements(), *_closure_statements(), *_one_step_statements(), *_hamming_statements()),
     )
 
 
@@ -292,10 +282,7 @@ def _closure_statements() -> list[Statement]:
             "Hamming's method, at 420 rpm and in a launch. For *debugging*, the same at 420 rpm by Runge-Kutta's method "
             "with a slip that we put in: its last stage is at mid-step",
             "1 to 100, our choice: the closure must show the error, and must not be more than a hundred times as large",
-            (
-                *judge_closure(),
-                Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0),
-            ),
+            (*judge_closure(), Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0)),
         ),
         Statement(
             "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "
@@ -360,7 +347,7 @@ def _one_step_statements() -> list[Statement]:
         for i, approach in enumerate(("first", "second"))
         for step in (STEPS[1], STEPS[-1])
     }
-    used = runge_kutta(slider_derivatives, [0.0, 0.0], STEP, 1).evaluations
+    used = len(CLASSICAL)
     return [
         Statement(
             "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "

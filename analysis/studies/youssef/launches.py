@@ -255,10 +255,7 @@ def _settled() -> tuple[Case, ...]:
             Case(label=label, computed=None, why="the steady motion of a free crank does not stay assembled")
             for label in ("time", DECAY)
         )
-    return (
-        at_least("time", 1.0, last.time / max(x.time for x in sooner)),
-        at_most(DECAY, 1.0, last.decay),
-    )
+    return (at_least("time", 1.0, last.time / max(x.time for x in sooner)), at_most(DECAY, 1.0, last.decay))
 
 
 def launch_speeds() -> StudyResult:

@@ -200,17 +200,13 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float6
 
     Without a damper this is (4.32).
     """
-    s, d, k, f = (
-        equation.spring_factor,
-        equation.damping_factor,
-        equation.stiffness.to_order(2),
-        equation.force.to_order(2),
-    )
-    b00, (b11, b13), (b12, b14) = (
-        equation.spring * s.mean + k.mean,
-        equation.spring * s.cos[1:3] + k.cos[1:],
-        equation.spring * s.sin[1:3] + k.sin[1:],
-    )
+    s = equation.spring_factor
+    d = equation.damping_factor
+    k = equation.stiffness.to_order(2)
+    f = equation.force.to_order(2)
+    b00 = equation.spring * s.mean + k.mean
+    (b11, b13) = equation.spring * s.cos[1:3] + k.cos[1:]
+    (b12, b14) = equation.spring * s.sin[1:3] + k.sin[1:]
     (d11, d13), (d12, d14) = equation.damping * d.cos[1:3], equation.damping * d.sin[1:3]
     a = [
         [2 * b00, b11 - d12, b12 + d11, b13 - 2 * d14, b14 + 2 * d13],

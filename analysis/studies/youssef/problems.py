@@ -18,7 +18,7 @@ from math import degrees, radians
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ... import synthesis as syn
 from ...units import CM_PER_METRE
@@ -33,43 +33,55 @@ N, WEIGHTED_N = 72, 24
 AREA_N = 360
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class PublishedProblem:
     """Synthesis problem of the thesis with its printed linkage.
 
     Attributes
     ----------
     task : Task
-    bounds : mapping
-        Bounds on the dimensions, as `synthesize` takes them.
-    constraints : tuple
-        Constraints, as `synthesize` takes them; they are ours, except for the bounds.
     printed : Linkage
         Linkage with the printed digits.
-    mended : Linkage, optional
-        Linkage with its misprints mended, if it has any.
     error : float or None
         Printed error, in ``unit``.
     goal : float
         Error to be reached, in ``unit``.
-    unit : str
-        Unit of the error.
-    per_si : float
-        Number of this unit in one m2 or rad2.
-    source : str
-        Place in the thesis.
+    mended : Linkage, optional
+        Linkage with its misprints mended, if it has any.
+    bounds : mapping
+        Bounds on the dimensions, as `synthesize` takes them.
+    limits : tuple, optional
+        Constraints; see ``constraints`` for those of most problems.
     """
 
     task: syn.Task
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    constraints: tuple[syn.Constraint, ...]
     printed: syn.Linkage
-    mended: syn.Linkage | None = None
     error: float | None
     goal: float
-    unit: str = "cm2"
-    per_si: float = CM2_PER_M2
-    source: str
+    mended: syn.Linkage | None = None
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    limits: tuple[syn.Constraint, ...] | None = None
+
+    @property
+    def constraints(self) -> tuple[syn.Constraint, ...]:
+        """Return the constraints, as `synthesize` takes them; they are ours, except for the bounds."""
+        if self.limits is not None:
+            return self.limits
+        if isinstance(self.task, syn.RockerFunction):
+            return (syn.FullTurn(),)
+        return (syn.LargestLink(length=self.linkage.largest_link), *syn.USUAL)
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the error."""
+        return "deg2" if isinstance(self.task, syn.RockerFunction) else "cm2"
+
+    @property
+    def per_si(self) -> float:
+        """Return the number of this unit in one m2 or rad2; the thesis divides an error by its greatest weight."""
+        if not isinstance(self.task, syn.RockerFunction):
+            return CM2_PER_M2
+        return DEG2_PER_RAD2 / float(np.max(np.asarray(self.task.weights, dtype=float)))
 
     @property
     def linkage(self) -> syn.Linkage:
@@ -97,18 +109,22 @@ def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 
 
+def rocker_angle_deg(rotation: ArrayLike) -> NDArray[np.float64]:
+    """Return the desired rocker angle th4* = 70 + 100 |sin(th/2)| (deg) at crank rotations th (rad)."""
+    return np.asarray(70.0 + 100.0 * np.abs(np.sin(0.5 * np.asarray(rotation))))
+
+
 def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> syn.RockerFunction:
-    """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
+    """Return the function `rocker_angle_deg` at n crank angles, optionally weighted by `WEIGHT`.
 
     With ``mounting`` the output may be mounted on the rocker at any angle. The weighted window is 60 to 260 degrees, with both
     ends. The thesis prints 60 < omega t < 260 and an error of 35.0 deg2. The computed error comes nearest to 35.0 if 60 degrees
     belongs to the window, with 24 crank angles, and if only the errors within the window are added up.
     """
-    phi = syn.turn(n)
     # in whole numbers, so that the ends of the window are exact
     within = np.array([60 * n <= 360 * k <= 260 * n for k in range(n)])
     return syn.RockerFunction(
-        angle=np.radians(70.0 + 100.0 * np.abs(np.sin(0.5 * phi))),
+        angle=np.radians(rocker_angle_deg(syn.turn(n))),
         weights=np.where(within, WEIGHT, 1.0) if weighted else None,
         mounting=mounting,
     )
@@ -158,21 +174,8 @@ def _linkage(
     branch: int = 1,
 ) -> syn.Linkage:
     """Build a linkage from the printed numbers: X0, Y0; l1 to l4; r; a1, th20, a2 (cm, deg)."""
-    l1, l2, l3, l4 = links_cm
-    a1, th20, a2 = angles_deg
-    return syn.Linkage(
-        pivot_x=place_cm[0] / CM_PER_METRE,
-        pivot_y=place_cm[1] / CM_PER_METRE,
-        ground_length=l1 / CM_PER_METRE,
-        crank_length=l2 / CM_PER_METRE,
-        coupler_length=l3 / CM_PER_METRE,
-        rocker_length=l4 / CM_PER_METRE,
-        point_distance=point_cm / CM_PER_METRE,
-        ground_angle=radians(a1),
-        crank_phase=radians(th20),
-        point_angle=radians(a2),
-        branch=branch,
-    )
+    lengths = (x / CM_PER_METRE for x in (*place_cm, *links_cm, point_cm))
+    return syn.Linkage.from_vector([*lengths, *map(radians, angles_deg)], branch)
 
 
 _ELLIPSE_A = _linkage((16.48, -47.89), (65.31, 5.04, 112.85, 104.34), 63.26, (-92.82, 96.26, 114.02))
@@ -186,32 +189,17 @@ _PATH_B = _linkage((-49.13, 144.98), (142.576, 8.18, 152.743, 183.443), 147.38, 
 _PACKAGING = _linkage((94.53, -48.55), (137.54, 36.05, 134.05, 40.06), 435.15, (116.73, 0.0, 345.01), branch=-1)
 
 
-def _capped(linkage: syn.Linkage) -> tuple[syn.Constraint, ...]:
-    """Return the usual constraints, and the bound that no link is longer than the longest of ``linkage``."""
-    return (syn.LargestLink(length=linkage.largest_link), *syn.USUAL)
-
-
-_PATH_B_READ = replace(_PATH_B, rocker_length=184.443 / CM_PER_METRE)
 PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
     {
-        "ellipse-a": PublishedProblem(
-            task=syn.TimedPath(points=ellipse(10.0, N)),
-            constraints=_capped(_ELLIPSE_A),
-            printed=_ELLIPSE_A,
-            error=0.889,
-            goal=0.46,
-            source="Youssef, chapter VI, ellipse (a), timed",
-        ),
-        "ellipse-b": PublishedProblem(
-            task=syn.TimedPath(points=ellipse(15.0, N)),
-            constraints=_capped(_ELLIPSE_B),
-            printed=_ELLIPSE_B,
-            error=4.001,
-            goal=0.62,
-            source="Youssef, chapter VI, ellipse (b), timed",
-        ),
+        "ellipse-a": PublishedProblem(syn.TimedPath(points=ellipse(10.0, N)), _ELLIPSE_A, 0.889, 0.46),
+        "ellipse-b": PublishedProblem(syn.TimedPath(points=ellipse(15.0, N)), _ELLIPSE_B, 4.001, 0.62),
         "ellipse-a-bounded": PublishedProblem(
-            task=syn.TimedPath(points=ellipse(10.0, N)),
+            syn.TimedPath(points=ellipse(10.0, N)),
+            _BOUNDED,
+            53.6,
+            6.4,
+            # ERRATA: a1 = 93.8 deg is printed without its sign
+            mended=replace(_BOUNDED, ground_angle=radians(-93.8)),
             bounds=MappingProxyType(
                 {
                     **dict.fromkeys(("ground_length", "coupler_length", "rocker_length"), (0.1, 0.3)),
@@ -220,65 +208,36 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
                     "point_distance": (0.0, 0.3),
                 }
             ),
-            constraints=syn.USUAL,
-            printed=_BOUNDED,
-            # ERRATA: a1 = 93.8 deg is printed without its sign
-            mended=replace(_BOUNDED, ground_angle=radians(-93.8)),
-            error=53.6,
-            goal=6.4,
-            source="Youssef, chapter VI, ellipse (a), timed, with bounds on the lengths",
+            limits=syn.USUAL,
         ),
-        "rocker": PublishedProblem(
-            task=rocker_function(N),
-            constraints=(syn.FullTurn(),),
-            printed=_ROCKER,
-            error=700.0,
-            goal=1025.0,
-            unit="deg2",
-            per_si=DEG2_PER_RAD2,
-            source="Youssef, chapter VI, rocker function, unweighted; N is not printed",
-        ),
-        "rocker-weighted": PublishedProblem(
-            task=rocker_function(WEIGHTED_N, weighted=True),
-            constraints=(syn.FullTurn(),),
-            printed=_WEIGHTED,
-            error=35.0,
-            goal=35.6,
-            unit="deg2",
-            per_si=DEG2_PER_RAD2 / WEIGHT,
-            source="Youssef, chapter VI, rocker function, weighted; N is not printed",
-        ),
+        "rocker": PublishedProblem(rocker_function(N), _ROCKER, 700.0, 1025.0),
+        "rocker-weighted": PublishedProblem(rocker_function(WEIGHTED_N, weighted=True), _WEIGHTED, 35.0, 35.6),
         "path-a": PublishedProblem(
-            task=syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.10*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
-            constraints=_capped(_PATH_A),
-            printed=_PATH_A,
+            syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.10*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            _PATH_A,
+            2.3,
+            0.125,
             # ERRATA: X0 = 154.85 cm, the point misplaced by a digit: the curve would lie 139 cm beside its target
             mended=replace(_PATH_A, pivot_x=15.485 / CM_PER_METRE),
-            error=2.3,
-            goal=0.125,
-            source="Youssef, chapter VI, path (a), area",
         ),
         "path-b": PublishedProblem(
-            task=syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.15*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
-            constraints=_capped(_PATH_B_READ),
-            printed=_PATH_B,
+            syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.15*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            _PATH_B,
+            12.6,
+            0.31,
             # ERRATA: l4 = 183.443 cm
-            mended=_PATH_B_READ,
-            error=12.6,
-            goal=0.31,
-            source="Youssef, chapter VI, path (b), area",
+            mended=replace(_PATH_B, rocker_length=184.443 / CM_PER_METRE),
         ),
         "packaging": PublishedProblem(
-            task=_packaging(),
+            _packaging(),
+            _PACKAGING,
+            None,
+            620.0,
             # the crank shaft lies below the line, by no more than the coupler point's reach
             bounds=MappingProxyType(
                 {"pivot_y": ((PACKAGING_OFFSET_CM[1] - 500.0) / CM_PER_METRE, PACKAGING_OFFSET_CM[1] / CM_PER_METRE)}
             ),
-            constraints=(syn.LargestLink(length=_PACKAGING.point_distance), *syn.USUAL),
-            printed=_PACKAGING,
-            error=None,
-            goal=620.0,
-            source="Youssef, chapter VI and appendix 5, packaging machine",
+            limits=(syn.LargestLink(length=_PACKAGING.point_distance), *syn.USUAL),
         ),
     }
 )

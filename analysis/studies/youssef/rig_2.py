@@ -45,10 +45,8 @@ def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float)
 
     The speeds are in rpm. The single mass is on the same spring and damper.
     """
-    rates, amplitudes = (
-        RAD_S_PER_RPM * speeds,
-        np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()]),
-    )
+    rates = RAD_S_PER_RPM * speeds
+    amplitudes = np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()])
     ratios = amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)
     return float(ratios[np.abs(ratios - 1.0).argmax()])
 

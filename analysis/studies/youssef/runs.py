@@ -76,21 +76,6 @@ class SteadyTurn:
     torque: NDArray[np.float64]
     change: float
 
-    @property
-    def amplitude(self) -> float:
-        """Return half the distance between the least and the greatest slider position (cm)."""
-        return 0.5 * float(np.ptp(self.slider_cm))
-
-    @property
-    def peaks(self) -> int:
-        """Return the number of maxima and minima of the slider position over the turn, both together."""
-        rise = np.diff(self.slider_cm)
-        return int(np.sum(np.sign(rise) != np.sign(np.roll(rise, 1))))
-
-    def harmonic(self, order: int) -> float:
-        """Return the amplitude (cm) of a harmonic of the slider position; order 1 has one cycle per turn of the crank."""
-        return 2.0 * float(np.abs(np.fft.rfft(self.slider_cm[:-1])[order])) / (len(self.slider_cm) - 1)
-
 
 @cache
 def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
@@ -98,23 +83,13 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
     period, samples = 60.0 / speed_rpm, 1440
     inputs = Inputs(speed=speed_rpm * RAD_S_PER_RPM)
     turns = ceil(SETTLING_TIME / period)
-    settling = simulate(
-        parameters,
-        inputs,
-        initial=InitialState(slider_position=start[0], slider_velocity=start[1]),
-        stop_time=turns * period,
-        step=turns * period,
-    )
+    begun = InitialState(slider_position=start[0], slider_velocity=start[1])
+    settling = simulate(parameters, inputs, initial=begun, stop_time=turns * period, step=turns * period)
     if settling.status:
         raise AssemblyError(f"the mechanism does not stay assembled at {speed_rpm:g} rpm: {settling.message}")
     u, v = (float(settling[name][-1]) for name in ("slider.position", "slider.velocity"))
-    run = simulate(
-        parameters,
-        inputs,
-        initial=InitialState(slider_position=u, slider_velocity=v),
-        stop_time=2.0 * period,
-        step=period / samples,
-    )
+    settled = InitialState(slider_position=u, slider_velocity=v)
+    run = simulate(parameters, inputs, initial=settled, stop_time=2.0 * period, step=period / samples)
     u_cm = CM_PER_METRE * run["slider.position"]
     return SteadyTurn(
         np.linspace(0.0, 360.0, samples + 1),

@@ -25,9 +25,9 @@ from ...synthesis import RockerFunction, TargetPath, UntimedPath, area_differenc
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, pad_columns
+from ..study import Study, StudyResult, pad_columns, result_curves
 from .chapter_6 import PRINTED, TARGET, FloatArray, our_error
-from .problems import PROBLEMS, N, ellipse, pairing_area
+from .problems import PROBLEMS, N, ellipse, pairing_area, rocker_angle_deg
 
 PROBLEM = "ellipse-a-bounded"
 #: Bounds of X0, Y0, l1 to l4, r (cm), a1, th20, a2 (rad).
@@ -53,10 +53,8 @@ SETS, CHANCE = 2000, 0.05
 #: Kinds of searches: from random sets, and with minima already located among the sets.
 PLAIN, KNOWN = "random sets", "with known minima"
 #: Tolerances in words.
-ALL, LEVEL = (
-    f"all, to within {SMALL:g} of the minimum's error, the rule for *small*",
-    f"{CHANCE:g}, the usual level of significance",
-)
+ALL = f"all, to within {SMALL:g} of the minimum's error, the rule for *small*"
+LEVEL = f"{CHANCE:g}, the usual level of significance"
 
 Error = Callable[[FloatArray], float]
 
@@ -198,7 +196,7 @@ def rocker_error(v: FloatArray) -> float:
     pin = l2 * np.exp(1j * (phi + v[8]))
     reach = np.abs(l1 - pin)
     turned = np.arccos(np.clip((l3**2 + reach**2 - l4**2) / (2.0 * l3 * reach), -1.0, 1.0))
-    wanted = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
+    wanted = rocker_angle_deg(phi)
     errors = []
     for side in (1.0, -1.0):
         joint = pin + l3 * np.exp(1j * (np.angle(l1 - pin) + side * turned))
@@ -472,14 +470,11 @@ def judge_time(found: Mapping[str, tuple[Found, ...]]) -> Statement:
 
 def draw(result: StudyResult) -> Figure:
     """Draw the errors at the ends of the searches, in ascending order."""
-    c = result.columns
-    share = c["share of the searches [%]"]
-    names = [name for name in c if name.startswith("error; ")]
-    curves = [
-        Curve(x=share, y=c[name], label=name.removeprefix("error; ").removesuffix(" [cm2]"), marker=".", colour=colour)
-        for name, colour in zip(names, COLOURS)
-    ]
-    curves.append(Curve(x=share, y=c["least error [cm2]"], label="least error", colour=TARGET, line="--"))
+    share, least = "share of the searches [%]", "least error [cm2]"
+    names = [name for name in result.columns if name.startswith("error; ")]
+    labels = {name: name.removeprefix("error; ").removesuffix(" [cm2]") for name in names}
+    curves = result_curves(result, share, labels, marker=".")
+    curves += result_curves(result, share, {least: "least error"}, colour=TARGET, line="--")
     panel = Panel(
         x_label="searches that end below, of all [%]",
         y_label="error at the end [cm$^2$]",

@@ -469,10 +469,7 @@ TABLE = {
         "to be the closer part (L5807).",
     ),
     "7.10": Motions(
-        "The weighted part p1 p2 is traced more closely, the rest less so.",
-        ("direct", "weighted"),
-        "paths",
-        see="7.9",
+        "The weighted part p1 p2 is traced more closely, the rest less so.", ("direct", "weighted"), "paths", see="7.9"
     ),
 }
 
@@ -490,10 +487,7 @@ def compute(number: str) -> StudyResult:
 
 
 #: The studies by number.
-STUDIES = {
-    "7.4": Study(curve_wanted, draw_wanted),
-    "7.5": Study(two_positions, draw_positions),
-} | {
+STUDIES = {"7.4": Study(curve_wanted, draw_wanted), "7.5": Study(two_positions, draw_positions)} | {
     number: Study(partial(compute, number), partial(draw_motions, names=row.names, what=row.what))
     for number, row in TABLE.items()
 }

@@ -40,7 +40,7 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import TABLE, best
 from .chapter_7 import LIMITS, enclosed_area, reached_area, slider
-from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path
+from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path, rocker_angle_deg
 from .stated_errors import ROUNDED, errors_by_reading, half_units
 
 FloatArray = NDArray[np.float64]
@@ -147,13 +147,8 @@ def window_error(linkage: Linkage) -> float:
 
 def angle_error(linkage: Linkage) -> FloatArray:
     """Return the rocker angle minus the desired angle (deg) at the rotations `TURN`, between -180 and 180."""
-    off = np.degrees(linkage.rocker_angle(TURN)) - wanted_angle()
+    off = np.degrees(linkage.rocker_angle(TURN)) - rocker_angle_deg(TURN)
     return np.asarray((off + 180.0) % 360.0 - 180.0)
-
-
-def wanted_angle() -> FloatArray:
-    """Return the desired rocker angle (deg) at the rotations `TURN`."""
-    return np.asarray(70.0 + 100.0 * np.abs(np.sin(0.5 * TURN)))
 
 
 @cache
@@ -184,13 +179,13 @@ def moved_rocker() -> StudyResult:
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     found = {n: rocker_motion(n) for n in (1, 2, 3)}
-    columns = {"crank rotation [deg]": np.degrees(TURN), "target angle [deg]": wanted_angle()}
+    columns = {"crank rotation [deg]": np.degrees(TURN), "target angle [deg]": rocker_angle_deg(TURN)}
     columns["angle; fixed [deg]"] = np.degrees(p.linkage.rocker_angle(TURN))
     columns["error; fixed [deg]"] = angle_error(p.linkage)
     for n, solution in found.items():
         columns[f"slider; {n} [cm]"] = CM_PER_METRE * slider(solution.linkage).series(TURN)
         columns[f"error; {n} [deg]"] = angle_error(solution.linkage)
-        columns[f"angle; {n} [deg]"] = wanted_angle() + columns[f"error; {n} [deg]"]
+        columns[f"angle; {n} [deg]"] = rocker_angle_deg(TURN) + columns[f"error; {n} [deg]"]
     return StudyResult(
         claim="The slider, moved by two harmonics, reduces the weighted error of the rocker function from 35.0 to 4.8 deg2.",
         assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
@@ -410,10 +405,7 @@ def _path() -> tuple[Statement, ...]:
                     why="l4 = 183.443 and A0 = 3.1 are read as misprints",
                 ),
                 near(
-                    f"mended; rounded {min(span):.2f} to {max(span):.2f}",
-                    "4.3",
-                    float(np.clip(4.3, *span)),
-                    unit="cm2",
+                    f"mended; rounded {min(span):.2f} to {max(span):.2f}", "4.3", float(np.clip(4.3, *span)), unit="cm2"
                 ),
             ),
             "the 12.6 cm2 are judged at L5051, Fig 6.9",
@@ -453,11 +445,9 @@ def draw_path(result: StudyResult) -> Figure:
     labels = {"fixed": "pivot fixed", "printed": "printed series, mended"} | {
         f"{n}": f"{n} harmonics" for n in PATH_SEARCHES
     }
-    curves, distances, sliders = (
-        [Curve(x=c["target x [cm]"], y=c["target y [cm]"], label="target", colour=TARGET, line="--")],
-        [],
-        [],
-    )
+    curves = [Curve(x=c["target x [cm]"], y=c["target y [cm]"], label="target", colour=TARGET, line="--")]
+    distances = []
+    sliders = []
     for (name, label), colour in zip(labels.items(), (FIXED, *COLOURS)):
         curves.append(Curve(x=c[f"{name} x [cm]"], y=c[f"{name} y [cm]"], label=label, colour=colour))
         place, distance = c["place on the ellipse [deg]"], c[f"{name} distance [cm]"]
