@@ -307,19 +307,19 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
 
-    def orbit_at(value: float) -> PeriodicOrbit:
+    def find_nearby(value: float) -> PeriodicOrbit:
         parameters, drive = family.operation(value)
         return newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
 
     step = 1e-3 * max(abs(special.parameter), 1e-9)
-    largest = [orbit_at(special.parameter + sign * step).largest for sign in (-1.0, 1.0)]
+    largest = [find_nearby(special.parameter + sign * step).largest for sign in (-1.0, 1.0)]
     rates = [(value - special.orbit.largest) / step for value in largest]
     sign, rate = max(zip((-1.0, 1.0), rates), key=lambda pair: pair[1])
     if rate <= 0.0:
         raise LinkworkError(f"the motion at {family.format_value(special.parameter)} is unstable on neither side")
     beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
     value = special.parameter + sign * beyond / rate
-    old = orbit_at(value)
+    old = find_nearby(value)
     if old.largest <= 1.0:
         raise LinkworkError(
             f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow for a run"
