@@ -1,12 +1,13 @@
 """Planar linkages and a target for the tests: a fixed linkage, and random linkages with general values of all dimensions."""
 
+from dataclasses import replace
 from math import cos, hypot, pi, sqrt
 
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from analysis.synthesis import Linkage, turn
+from analysis.synthesis import LENGTHS, Linkage, turn
 
 #: A crank-rocker for tests that move its rocker pivot.
 BASE = Linkage(
@@ -57,6 +58,11 @@ def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:
         output_angle=random.uniform(-pi, pi),
         branch=branch,
     )
+
+
+def scaled(linkage: Linkage, factor: float) -> Linkage:
+    """Return a four-bar with every length, and the position of A, multiplied by the factor."""
+    return replace(linkage, **{name: factor * getattr(linkage, name) for name in LENGTHS})
 
 
 def linkages() -> st.SearchStrategy[Linkage]:

@@ -14,7 +14,6 @@ from scipy.optimize import nnls
 import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis.search.fit import fit_least_squares, residuals, sum_of_squares
-from analysis.synthesis.search.polish import polish
 from analysis.synthesis.search.program import Program, Start, make_linkage, make_start
 from analysis.synthesis.search.scan import scan
 from analysis.synthesis.task.limits import make_limits
@@ -169,15 +168,9 @@ class TestBounds:
         ("name", "low", "high"),
         [
             ("pivot_x", 0.30, 0.32),
-            ("pivot_y", -0.05, -0.04),
-            ("ground_length", 0.20, 0.21),
-            ("crank_length", 0.055, 0.06),
-            ("coupler_length", 0.2, 0.22),
             ("rocker_length", 0.3, 0.31),
             ("point_distance", 0.1, 0.15),
-            ("ground_angle", 1.0, 1.1),
             ("crank_phase", -0.5, -0.4),
-            ("point_angle", -1.0, -0.9),
         ],
     )
     def test_each_holds(self, name: str, low: float, high: float) -> None:
@@ -209,29 +202,13 @@ class TestConstraints:
         place = solution.linkage.pins(0.0)[pivot]
         assert Polygon(polygon).distance(Point(place)) < 1e-7
 
-    def test_both_pivots_in_regions_of_their_own(self) -> None:
-        from shapely import Point, Polygon
-
-        square = np.array([[0.2, -0.35], [0.5, -0.35], [0.5, 0.0], [0.2, 0.0]])
-        solution = best(
-            *syn.USUAL, syn.PivotRegion(pivot="A", polygon=square), syn.PivotRegion(pivot="D", polygon=L_SHAPE), SMALL
-        )
-        pins = solution.linkage.pins(0.0)
-        assert Polygon(square).distance(Point(pins["A"])) < 1e-7
-        assert Polygon(L_SHAPE).distance(Point(pins["D"])) < 1e-7
-
     @pytest.mark.parametrize("type_", ["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"])
     def test_every_grashof_type_can_be_had(self, type_: Any) -> None:
         # an arc, half a turn of the crank at most: what each type can do
         t = np.linspace(0.0, 1.2, 9)
         task = syn.TimedPath(points=np.column_stack([np.cos(t), np.sin(t) + 0.1 * t * t]), rotation=t)
         solution = best(syn.Grashof(type=type_), task=task)
-        assert solution.verdicts.grashof in (type_, "change-point")
-        lengths = np.sort(
-            [getattr(solution.linkage, f"{name}_length") for name in ("ground", "crank", "coupler", "rocker")]
-        )
-        excess = lengths[0] + lengths[3] - lengths[1] - lengths[2]
-        assert excess >= -1e-6 if type_ == "triple-rocker" else excess <= 1e-6
+        assert solution.verdicts.grashof == type_
         assert solution.evaluation.worst < 0.05
 
     def test_least_transmission_over_a_turn(self) -> None:
@@ -278,14 +255,6 @@ class TestConstraints:
         assert math.degrees(solution.ground_angle) == pytest.approx(100.0, abs=1e-4)
         assert max(solution.coupler_length, solution.rocker_length) <= 0.15 + 1e-7
 
-    def test_functions_of_the_users_own_are_traced_through(self) -> None:
-        def height(p: Any) -> Any:
-            return sum([p.ground_length * np.sin(x) for x in (p.ground_angle,)])
-
-        bound = syn.Require(function=lambda p: 0.1 - height(p))
-        solution = best(*syn.USUAL, SMALL, bound)
-        assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
-
     def test_what_loses_the_symbol_is_refused_by_name(self) -> None:
         # float() of a symbol is NaN, and so would the constraint be
         branching = lambda p: p.pivot_x if p.pivot_x > 0 else 0.0  # noqa: E731
@@ -309,15 +278,6 @@ class TestWeights:
         assert heavy.evaluation.errors[7] < 0.2 * plain.evaluation.errors[7]
         assert heavy.error == pytest.approx(float(weights @ heavy.evaluation.errors**2))
 
-    def test_a_weight_of_zero_leaves_a_point_out(self) -> None:
-        points = ellipse(24)
-        points[5] += 0.05
-        weights = np.ones(24)
-        weights[5] = 0.0
-        solution = best(*syn.USUAL, SMALL, task=syn.TimedPath(points=points, weights=weights))
-        assert solution.evaluation.errors[5] > 0.05
-        assert np.delete(solution.evaluation.errors, 5).max() < 0.01
-
 
 FOUR_BAR = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
 
@@ -337,38 +297,6 @@ class TestMovedPivot:
         again = make_linkage(make_start(linkage, normal, unknown), normal, unknown)
         np.testing.assert_allclose(again.displacement(syn.turn(9)), linkage.displacement(syn.turn(9)), atol=1e-14)
         assert again.values() == pytest.approx(linkage.values())
-
-    def test_the_slider_keeps_stroke_speed_and_acceleration(self) -> None:
-        fixed = best(*syn.USUAL, syn.LargestLink(length=0.2))
-        few: dict[str, Any] = {"search": syn.Search(starts=1, candidates=64), "guesses": [fixed]}
-        free = best(*syn.USUAL, syn.LargestLink(length=0.2), pivot=syn.SliderUnknown(harmonics=2), **few)
-        bounded = best(
-            *syn.USUAL,
-            syn.LargestLink(length=0.2),
-            pivot=syn.SliderUnknown(harmonics=2, stroke=0.01, speed=0.005, acceleration=0.01, guide_angle=(0.2, 0.4)),
-            **few,
-        )
-        assert free.error < bounded.error < fixed.error
-        pivot = bounded.linkage.pivot
-        assert isinstance(pivot, syn.SliderMotion)
-        phi = syn.turn(1440)
-        assert 0.2 - 1e-9 <= pivot.guide_angle <= 0.4 + 1e-9
-        # held at 72 places
-        assert pivot.stroke <= 0.01 * 1.01
-        assert np.abs(pivot.series.derivative()(phi)).max() <= 0.005 * 1.01
-        assert np.abs(pivot.series.derivative().derivative()(phi)).max() <= 0.01 * 1.01
-        assert bounded.linkage.least_transmission >= radians(40) - 1e-3
-
-    def test_program_and_linkage_agree_on_the_error(self) -> None:
-        for unknown in (
-            syn.SliderUnknown(harmonics=1),
-            syn.CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5),
-        ):
-            solution = best(*syn.USUAL, syn.LargestLink(length=0.3), pivot=unknown, search=replace(FEW, starts=1))
-            normal = syn.normal_form(TASK)
-            limits = make_limits(TASK, normal, None, (*syn.USUAL, syn.LargestLink(length=0.3)))
-            again = Program(normal, limits, unknown).solve(make_start(solution.linkage, normal, unknown))
-            assert again.start.quality * normal.unit**2 == pytest.approx(solution.error, rel=1e-3)
 
 
 def violations(program: Program, start: Start, *, first: bool = False) -> dict[str, float]:
@@ -413,13 +341,6 @@ class TestBetween:
         pivot = syn.SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
         over = excess(FOUR_BAR.with_pivot(pivot), syn.SliderUnknown(harmonics=1), "slider position")
         assert (over > 0.0) == (abs(u) > FOUR_BAR.ground_length)
-
-    @pytest.mark.parametrize("rate", [0.4999, 0.5001, -0.4999, -0.5001])
-    def test_speed_of_the_second_crank(self, rate: float) -> None:
-        pivot = syn.SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
-        unknown = syn.CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
-        over = excess(FOUR_BAR.with_pivot(pivot), unknown, "speed of the second crank")
-        assert (over > 0.0) == (abs(rate) > 0.5)
 
     @pytest.mark.parametrize(("share", "refused"), [(1.1e-3, False), (0.9e-3, True), (7.9, False), (8.1, True)])
     def test_rotation_from_one_untimed_station_to_the_next(self, share: float, refused: bool) -> None:
@@ -479,29 +400,6 @@ class TestBetween:
 
 
 class TestUntimed:
-    def test_area_and_distance_come_to_nothing_on_a_known_curve(self) -> None:
-        known = drawn(np.random.default_rng(8), least=0.9)
-        path = syn.TargetPath(points=known.path(syn.turn(180)), closed=True)
-        for measure in ("area", "distance"):
-            task = syn.UntimedPath(path=path, measure=measure, samples=48)
-            solution = best(*syn.USUAL, task=task)
-            normal = syn.normal_form(task)
-            assert solution.error < 5e-3 * normal.unit**2
-            assert solution.evaluation.worst < 5e-3 * normal.unit
-            assert solution.verdicts.sound
-
-    def test_the_area_is_what_evaluation_finds(self) -> None:
-        phi = syn.turn(180)
-        task = syn.UntimedPath(
-            path=syn.TargetPath(points=np.column_stack([np.cos(phi), 0.6 * np.sin(phi)]), closed=True)
-        )
-        normal = syn.normal_form(task)
-        limits = make_limits(task, normal, None, (syn.LeastTransmission(), syn.LargestLink(length=1.5)))
-        done = polish(normal, limits, scan(normal, limits, seed=0, candidates=4096, starts=3))
-        answer = done.kept[0]
-        found = syn.evaluate(task, make_linkage(answer.start, normal), answer.start.rotation)
-        assert answer.start.quality * normal.unit**2 == pytest.approx(found.error, rel=0.1)
-
     def test_program_needs_rotations_to_start_from(self) -> None:
         task = syn.Motion(points=ellipse(6), angle=syn.turn(6))
         normal = syn.normal_form(task)
@@ -517,9 +415,6 @@ class TestBadUnknowns:
     @pytest.mark.parametrize(
         ("make", "message"),
         [
-            (lambda: syn.SliderUnknown(harmonics=-1), "harmonics is -1"),
-            (lambda: syn.SliderUnknown(harmonics=1, guide_angle=(1.0, 0.0)), "bounds of guide_angle"),
-            (lambda: syn.SliderUnknown(harmonics=1, stroke=0.0), "greatest stroke is 0.0"),
             (lambda: syn.CrankUnknown(ratio=1, length=(0.2, 0.1)), "bounds of the second crank"),
             (lambda: syn.LeastTransmission(angle=2.0), "least transmission angle is 2.0"),
             (lambda: syn.LeastTransmission(over="way"), "over is 'way'"),

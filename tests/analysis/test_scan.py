@@ -21,6 +21,7 @@ from analysis.synthesis.search.scan import (
 )
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
+from tests.linkages import scaled
 
 FloatArray = NDArray[np.float64]
 
@@ -115,12 +116,11 @@ class TestVariableProjection:
         best = first(found, normal)
         error = syn.evaluate(task, best).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-8)
-        turned = best.scale(1.01)
         others = [
             best.translate(0.01, 0.0),
             best.translate(0.0, 0.01),
-            turned,
-            best.scale(0.99),
+            scaled(best, 1.01),
+            scaled(best, 0.99),
             replace(best, ground_angle=best.ground_angle + 0.01),
             replace(best, point_distance=best.point_distance + 0.01),
             replace(best, point_angle=best.point_angle + 0.01),

@@ -334,21 +334,6 @@ def test_links_and_slider_together_beat_either() -> None:
         assert low * (1.0 - 1e-9) - 1e-9 <= getattr(changed, name) <= high * (1.0 + 1e-9) + 1e-9, name
 
 
-def test_a_geared_second_crank_is_recovered() -> None:
-    """A path that a five-bar with gears traces, sought with its links kept: the gear's length and phase come out."""
-    base = drawn(np.random.default_rng(5), least=0.8)
-    gear = SecondCrank(length=0.08, ratio=2, phase=1.1)
-    wanted = base.with_pivot(gear)
-    phi = turn(36)
-    assert np.isfinite(wanted.path(phi)).all()
-    task = TimedPath(points=wanted.path(phi))
-    found = slider_motion(task, base, CrankUnknown(ratio=2, length=(0.01, 0.3)), search=Search(starts=8)).best
-    assert found.evaluation.worst < 1e-7
-    assert isinstance(found.linkage.pivot, SecondCrank)
-    assert found.linkage.pivot.length == pytest.approx(gear.length, rel=1e-6)
-    assert np.exp(1j * found.linkage.pivot.phase) == pytest.approx(np.exp(1j * gear.phase), abs=1e-6)
-
-
 # Open paths
 
 
@@ -365,16 +350,6 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
 
 
 # Manners
-
-
-def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
-    task = TimedPath(points=PROBLEMS["ellipse-b"].linkage.path(turn(24)) * [1.02, 0.97])
-    linkage = PROBLEMS["ellipse-b"].linkage
-    unknown = SliderUnknown(harmonics=1)
-    here = slider_motion(task, linkage, unknown, search=Search(starts=4)).best
-    far = replace(task, points=1000.0 * np.asarray(task.points) + [5e4, -2e4])
-    there = slider_motion(far, linkage.scale(1000.0).translate(5e4, -2e4), unknown, search=Search(starts=4)).best
-    assert there.error == pytest.approx(1e6 * here.error, rel=1e-5)
 
 
 def test_the_path_of_the_crank_pin_is_left_as_it_is() -> None:

@@ -10,6 +10,7 @@ from analysis.synthesis.result.solution import group_similar
 from analysis.synthesis.search.polish import distinct_answers
 from analysis.synthesis.search.program import Answer, make_start
 from analysis.synthesis.task.task import normal_form
+from tests.linkages import scaled
 
 SIZES = {"pivot_x": 0.1, "pivot_y": 0.05, "crank_length": 0.05, "coupler_length": 0.16, "point_distance": 0.09}
 ANGLES = {"ground_angle": 0.4, "crank_phase": 1.1, "point_angle": 0.7}
@@ -58,7 +59,7 @@ def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linka
         (FOUR_BAR, {"branch": -1}),
         (FOUR_BAR, {"point_angle": -0.7}),
         (FOUR_BAR, {"crank_length": 0.057}),
-        (FOUR_BAR.scale(1.3), {}),
+        (scaled(FOUR_BAR, 1.3), {}),
         (SLIDER, {"ground_length": -0.04}),
         (SLIDER, {"branch": -1}),
         (GEARED, {"pivot": syn.SecondCrank(0.03, ratio=-2.0, phase=0.9)}),

@@ -104,7 +104,6 @@ _STRAIGHT = Table(
         "end": Whole(0),
         "rotation": Quantity("rad"),
         "flatness": Quantity("m"),
-        "weight": Quantity("1"),
     },
 )
 

@@ -355,6 +355,24 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
     )
 
 
+def pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
+    """Build the four-bar whose pins A to D and coupler point P have these positions at a crank rotation of 0."""
+    ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
+    return Linkage(
+        pivot_x=a.real,
+        pivot_y=a.imag,
+        ground_length=abs(ground),
+        crank_length=abs(arm),
+        coupler_length=abs(coupler),
+        rocker_length=abs(c - d),
+        point_distance=abs(to_point),
+        ground_angle=float(np.angle(ground)),
+        crank_phase=float(np.angle(arm * ground.conjugate())),
+        point_angle=float(np.angle(to_point * coupler.conjugate())),
+        branch=1 if (coupler * (d - b).conjugate()).imag >= 0.0 else -1,
+    )
+
+
 def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     """Build the four-bar from two dyads, and check the linkage for defects from the first pose to the last."""
     points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
@@ -362,20 +380,8 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
     ground, arm, coupler = rocker.pivot - crank.pivot, b - crank.pivot, c - b
     sides = np.sign(np.imag(np.conj(rocker.pivot - b) * coupler))
-    linkage = Linkage(
-        pivot_x=crank.pivot.real,
-        pivot_y=crank.pivot.imag,
-        ground_length=abs(ground),
-        crank_length=abs(arm[0]),
-        coupler_length=abs(coupler[0]),
-        rocker_length=rocker.length,
-        point_distance=abs(points[0] - b[0]),
-        ground_angle=float(np.angle(ground)),
-        crank_phase=float(np.angle(arm[0] * np.conj(ground))),
-        point_angle=float(np.angle((points[0] - b[0]) * np.conj(coupler[0]))),
-        output_angle=float(np.angle(np.exp(1j * angle[0]) * np.conj(coupler[0]))),
-        branch=1 if sides[0] >= 0.0 else -1,
-    )
+    made = pinned_four_bar(*map(complex, (crank.pivot, b[0], c[0], rocker.pivot, points[0])))
+    linkage = replace(made, output_angle=float(np.angle(np.exp(1j * angle[0]) * np.conj(coupler[0]))))
     if linkage.turns_fully or linkage.grashof == "change-point":
         rotation = unwrap_in_order(np.angle(arm * np.conj(arm[0])))
     else:

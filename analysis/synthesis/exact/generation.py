@@ -46,7 +46,7 @@ from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission, crank_advance
 from ..task.limits import GROUND, LARGEST, check_bounds, check_greatest_length, check_sequence, complete_bounds
 from ..task.task import PrecisionPoints, RockerFunction, SliderFunction, Task, TimedPath, UntimedPath, turn
-from .burmester import INDEPENDENT, Exact, dyads_of_five, exact_solution, real_dyads
+from .burmester import INDEPENDENT, Exact, dyads_of_five, exact_solution, pinned_four_bar, real_dyads
 
 FloatArray = NDArray[np.float64]
 #: Lengths of crank, coupler and rocker in units of the ground link; crank phase and mounting angle of the output (rad).
@@ -269,12 +269,12 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     pins = {name: complex(*place) for name, place in linkage.pins(float(np.asarray(rotation))).items()}
     a, b, c, d, p = (pins[name] for name in "ABCDP")
     g = a + k * (d - a)
-    same = _pinned_four_bar(g, g + (1.0 - k) * (b - a), d + (1.0 - k) * (b - c), d, p)
+    same = pinned_four_bar(g, g + (1.0 - k) * (b - a), d + (1.0 - k) * (b - c), d, p)
     pin, other = a + k * (c - b), g + k * (c - d)
     return (
         replace(same, crank_phase=linkage.crank_phase),
-        _pinned_four_bar(a, pin, other, g, p),
-        _pinned_four_bar(g, other, pin, a, p),
+        pinned_four_bar(a, pin, other, g, p),
+        pinned_four_bar(g, other, pin, a, p),
     )
 
 
@@ -369,24 +369,6 @@ def _checked_coupler_ratio(linkage: Linkage) -> complex:
             "put the coupler point off B and C, whose curves are circles, in m",
         )
     return _coupler_ratio(linkage)
-
-
-def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
-    """Build the four-bar whose pins A to D and coupler point P have these positions at a crank rotation of 0."""
-    ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
-    return Linkage(
-        pivot_x=a.real,
-        pivot_y=a.imag,
-        ground_length=abs(ground),
-        crank_length=abs(arm),
-        coupler_length=abs(coupler),
-        rocker_length=abs(c - d),
-        point_distance=abs(to_point),
-        ground_angle=float(np.angle(ground)),
-        crank_phase=float(np.angle(arm * ground.conjugate())),
-        point_angle=float(np.angle(to_point * coupler.conjugate())),
-        branch=1 if (coupler * (d - b).conjugate()).imag >= 0.0 else -1,
-    )
 
 
 # Quick returns

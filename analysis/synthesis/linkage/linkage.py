@@ -90,10 +90,6 @@ class SliderMotion:
         """Return the distance between the ends of the slider's travel (m)."""
         return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
 
-    def scale(self, factor: float) -> SliderMotion:
-        """Return the motion for the same linkage with all lengths multiplied by the factor."""
-        return replace(self, series=self.series * factor)
-
 
 def gear_turns(ratio: float) -> tuple[int, int]:
     """Return the least whole numbers k and m: the first crank turns k times while the second crank turns m times.
@@ -159,10 +155,6 @@ class SecondCrank:
         """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""
         psi = self.angle(rotation)
         return self.length * np.cos(psi), self.length * np.sin(psi)
-
-    def scale(self, factor: float) -> SecondCrank:
-        """Return the motion for the same linkage with all lengths multiplied by the factor."""
-        return replace(self, length=self.length * factor)
 
 
 @in_si(**UNITS)
@@ -296,7 +288,7 @@ class Linkage:
     def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
         """Return the coupler point at crank rotations, shape (n, 2) in m; NaN if the links cannot be joined.
 
-        A given ``displacement`` of the rocker pivot (m) replaces the pivot's own motion, as in `directions`.
+        A given ``displacement`` of the rocker pivot (m) replaces the pivot's own motion.
         """
         out = np.empty((2, np.size(rotation)))
         coupler_path(*self._arguments(rotation, displacement), out)
@@ -316,10 +308,10 @@ class Linkage:
         link_jacobian(*self._arguments(rotation), out, jacobian)
         return out, jacobian
 
-    def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
+    def directions(self, rotation: ArrayLike) -> FloatArray:
         """Return cosine and sine of th3, of th4 and of th4 - th3, shape (6, n); angles from the ground link."""
         out = np.empty((6, np.size(rotation)))
-        link_directions(*self._arguments(rotation, displacement), out)
+        link_directions(*self._arguments(rotation), out)
         return out
 
     def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
@@ -377,11 +369,6 @@ class Linkage:
     def translate(self, x: float, y: float) -> Linkage:
         """Return the linkage shifted by (x, y) in the plane (m)."""
         return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
-
-    def scale(self, factor: float) -> Linkage:
-        """Return the linkage with every length, and the position of A, multiplied by the factor."""
-        lengths = {f.name: factor * getattr(self, f.name) for f in fields(self) if f.init and f.name in LENGTHS}
-        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scale(factor))
 
     @property
     def grashof(self) -> str:

@@ -213,10 +213,6 @@ class Statement:
             self._constrain(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
         if isinstance(pivot, SliderUnknown):
             self._constrain_slider(pivot, p.ground_length, v)
-        if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
-            self._bound_motion(
-                lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
-            )
         self._assemble(quality, [branch, direction, size, self._share], [grashof, *planes])
 
     def _assemble(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
@@ -357,18 +353,17 @@ class Statement:
             values = self._trace(self.least.along, p)
             greatest = self._auxiliary("greatest", casadi.mmax(values) / size, 0.0)
             self._constrain_nonpositive(values / size - greatest, self.least.along.name, "")
-            return greatest + (self._straight_part(p, v, phi, branch, ex, ey) if self._by_curve else 0.0)
-        return quality + self._straight_part(p, v, phi, branch, ex, ey)
+            if self._by_curve:
+                self._constrain_straight_part(p, v, phi, branch, ex, ey)
+            return greatest
+        self._constrain_straight_part(p, v, phi, branch, ex, ey)
+        return quality
 
-    def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
-        """Constrain the straight part of a path; return the term of the objective that favours flatness, or 0.
-
-        The term is 0 if the flatness is bounded. ``ex`` and ``ey`` are the errors at the stations.
-        """
+    def _constrain_straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> None:
+        """Constrain the straight part of a path, if there is one; ``ex`` and ``ey`` are the errors at the stations."""
         casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
         if straight is None or points is None:
-            return 0.0
-        part = slice(straight.start, straight.end + 1)
+            return
         line = points[straight.end] - points[straight.start]
         line /= abs(line)
         spent = phi[straight.end] - phi[straight.start]
@@ -378,16 +373,15 @@ class Statement:
             for k in (straight.start, straight.end):
                 self._constrain(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
         if straight.flatness is None:
-            off = (ey * line.real - ex * line.imag)[part]
-            return (straight.weight - 1.0) * casadi.sumsqr(off)
+            return
         # along the straight line through the part's ends, at the stations and in between
+        part = slice(straight.start, straight.end + 1)
         x, y = self._close_loop(p, v, self._dense_rotations(phi[part])[0], branch)[1]
         begin = points[straight.start]
         away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
         level = self._auxiliary("level", 0.5 * (casadi.mmin(away) + casadi.mmax(away)))
         half = 0.5 * straight.flatness
         self._constrain(away - level, -half, half, "flatness of the straight part")
-        return 0.0
 
     # Constraints
 

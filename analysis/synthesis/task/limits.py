@@ -100,14 +100,11 @@ class CrankUnknown:
         Bounds of the second crank's length (m).
     harmonics : int
         Number of harmonics of the rotation that is added to the rotation by the gears; 0 for gears alone.
-    speed : float
-        Greatest magnitude of the derivative of the added rotation with respect to phi.
     """
 
     ratio: float
     length: tuple[Amount, Amount]
     harmonics: int = 0
-    speed: float = inf
 
     def __post_init__(self) -> None:
         low, high = self.length

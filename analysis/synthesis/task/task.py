@@ -177,17 +177,13 @@ class Straight:
     rotation : float
         Greatest crank rotation for the straight part (rad).
     flatness : float, optional
-        Greatest extent of the traced part across the line from start to end (m); if it is not given, ``weight`` only favours
-        flatness.
-    weight : float
-        Weight of the squared deviation across the line from start to end, 1 or greater.
+        Greatest extent of the traced part across the line from start to end (m).
     """
 
     start: int
     end: int
     rotation: float
     flatness: float | None = None
-    weight: float = 1.0
 
     def __post_init__(self) -> None:
         if self.end <= self.start or self.start < 0:
@@ -198,8 +194,6 @@ class Straight:
             )
         if self.flatness is not None and not self.flatness > 0.0:
             raise InputError(f"flatness is {self.flatness}: it must be greater than zero (m)")
-        if not (isfinite(self.weight) and self.weight >= 1.0):
-            raise InputError(f"weight of the straight part is {self.weight}: it must be a finite number, 1 or greater")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
