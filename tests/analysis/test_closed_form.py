@@ -66,7 +66,12 @@ def test_so_has_a_search_for_poses_that_turn_one_way(seed: int) -> None:
 
 
 def assert_met(task: syn.PrecisionPoints) -> None:
-    assert any(solution.verdicts.sound for solution in syn.guidance(task).solutions)
+    exact = syn.guidance(task).solutions
+    assert any(solution.verdicts.sound for solution in exact)
+    for s in exact:
+        # a wide turn of the crank between two poses is no whole turn
+        if s.verdicts.branch and len(np.asarray(task.points)) == 5:
+            assert syn.Solution.from_linkage(task, s.linkage, s.evaluation.rotation).verdicts == s.verdicts
     quick = syn.Search(starts=4, candidates=1 << 10)
     best = syn.synthesize(task, constraints=[syn.LeastTransmission(angle=0.0, over="task")], search=quick).best
     assert best.verdicts.sound
@@ -96,13 +101,6 @@ def test_a_slide_is_no_link() -> None:
     assert (len(found.dyads), found.slides, len(found.solutions)) == (3, 1, 6)
     assert "3 of 4 possible links guide the body, and 1 slide in place of a link" in found.describe()
     assert max(s.evaluation.worst for s in found.sound) < 1e-12
-
-
-@pytest.mark.parametrize("n", [4, 5])
-def test_a_body_that_does_not_turn_is_refused(n: int) -> None:
-    points = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 0.0]]
-    with pytest.raises(InputError, match="the body does not turn"):
-        syn.guidance(syn.PrecisionPoints(points=points[:n], angle=[0.3] * n))
 
 
 @pytest.mark.parametrize("seed", [0, 3, 5, 8])
@@ -202,14 +200,6 @@ def test_rotations_beyond_the_swing_of_a_crank_are_a_branch_defect() -> None:
     assert solution.verdicts.defects == ("branch defect",)
 
 
-def test_none_is_sound_is_said_as_a_proof() -> None:
-    found = syn.guidance(random_poses(0, 5))
-    assert isinstance(found, syn.Guidance)
-    assert found.solutions
-    assert not found.sound
-    assert "no sound four-bar exists" in found.describe()
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_curve_of_four_poses(seed: int) -> None:
     found = syn.guidance(random_poses(seed, 4))
@@ -241,22 +231,6 @@ def test_map_of_four_poses_is_what_each_linkage_is_judged(seed: int) -> None:
                 assert found.transmission[i, k] == pytest.approx(least, abs=2e-5)
 
 
-@pytest.mark.parametrize("seed", [474, 666])
-def test_a_search_does_not_miss_an_exact_linkage(seed: int) -> None:
-    """A wide turn of the crank between two poses is no whole turn: the search judges its answers as closed form does."""
-    random = np.random.default_rng(seed)
-    task = syn.PrecisionPoints(points=random.uniform(-1.0, 1.0, (5, 2)), angle=random.uniform(-1.0, 1.0, 5))
-    exact = syn.guidance(task)
-    assert any(s.verdicts.sound for s in exact.solutions)
-    for s in exact.solutions:
-        if s.verdicts.branch:
-            assert syn.Solution.from_linkage(task, s.linkage, s.evaluation.rotation).verdicts == s.verdicts
-    open_way = [syn.LeastTransmission(angle=0.0, over="task")]
-    found = syn.synthesize(task, constraints=open_way, search=syn.Search(starts=2, candidates=1 << 10)).best
-    assert found.verdicts.sound
-    assert found.error < 1e-20
-
-
 def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
     """Pose by pose left out, the dyads of five poses lie on the curve of the other four."""
     task = random_poses(0, 5)
@@ -281,6 +255,7 @@ def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
         ([[0, 0], [1, 0], [2, 1]], [0.0, 0.1, 0.2], None, "3 poses"),
         ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], None, None, "there must be points"),
         ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], [0.1] * 5, None, "does not turn"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1] * 4, None, "does not turn"),
         ([[0, 0], [1, 0], [0, 0], [3, 1], [4, 0]], [0.1, 0.2, 0.1, 0.4, 0.5], None, "the same"),
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "give poses without"),
     ],

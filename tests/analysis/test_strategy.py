@@ -15,12 +15,10 @@ from analysis.synthesis import (
     ANGLES,
     LENGTHS,
     FullTurn,
-    Grashof,
     InfeasibleError,
     LargestLink,
     LeastTransmission,
     Linkage,
-    PrecisionPoints,
     RockerFunction,
     Search,
     SecondCrank,
@@ -234,21 +232,6 @@ def test_bad_input_is_named_before_anything_is_searched(
     task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
     with pytest.raises(InputError, match=words):
         simplest_mechanism(task, tolerance, **options)
-
-
-@pytest.mark.slow
-def test_a_mechanism_with_a_defect_is_not_taken() -> None:
-    """Seven points that a double-rocker meets within the tolerance, but on two circuits, or out of order."""
-    points = [[0.0, 0.0], [0.05, 0.03], [0.1, 0.04], [0.15, 0.02], [0.16, -0.03], [0.1, -0.08], [0.05, 0.02]]
-    task = PrecisionPoints(points=points)
-    found = simplest_mechanism(
-        task, 2e-3, constraints=(Grashof(type="double-rocker"),), search=Search(starts=3), harmonics=1, ratios=()
-    )
-    for step in found.steps:
-        if step.solution is not None and not step.solution.verdicts.sound and step.value <= 2e-3:
-            assert " defect: rejected" in step.reason
-    assert not any(step.reason.endswith("accepted") for step in found.steps if not step.solution.verdicts.sound)
-    assert not found.met or found.chosen.solution.verdicts.sound
 
 
 def step_of(verdicts: dict[str, bool], error: float) -> Step:

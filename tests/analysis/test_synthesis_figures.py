@@ -18,7 +18,7 @@ from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
 from analysis.files.drawings import Polyline
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis.result.output import LAYERS, rounded_hull
+from analysis.synthesis.result.output import rounded_hull
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
@@ -335,19 +335,6 @@ def test_further_positions_are_those_of_the_linkage() -> None:
     for number, points in enumerate(thin[::2]):
         pins = LINKAGE.pins(float(first + 0.5 * np.pi * number))
         np.testing.assert_allclose(points, [pins[name] for name in "ABCD"], atol=1e-12)
-
-
-def test_every_layer_is_seen_on_white_and_on_black(tmp_path) -> None:
-    """A contrast of three at least, by the formula of the WCAG, or the foreground's colour."""
-    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", syn.drawing(timed(), poses=2)))
-    for name, layer in LAYERS.items():
-        if layer.foreground:
-            assert document.layers.get(name).color == 7
-            continue
-        channels = np.array([layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255]) / 255.0
-        linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-        light = float(linear @ [0.2126, 0.7152, 0.0722])
-        assert min(1.05 / (light + 0.05), (light + 0.05) / 0.05) > 3.0, name
 
 
 def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:

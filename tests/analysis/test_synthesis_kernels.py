@@ -13,7 +13,6 @@ from analysis.numerics import symbolic
 from analysis.run import symbolic_equations
 from analysis.synthesis.linkage.kernels import (
     COLUMNS,
-    PLACES,
     coupler_path,
     coupler_path_jacobian,
     link_directions,
@@ -93,26 +92,6 @@ def test_path_angles_and_jacobians_are_those_of_the_plant(seed: int) -> None:
         np.testing.assert_allclose(np.exp(1j * angles[:, j]), np.exp(1j * values[2:, 0]), rtol=0.0, atol=1e-13)
         np.testing.assert_allclose(path_jacobian[:, :, j], jacobian[:2].T, rtol=1e-11, atol=1e-12)
         np.testing.assert_allclose(angle_jacobian[:, :, j], jacobian[2:].T, rtol=1e-11, atol=1e-12)
-
-
-@pytest.mark.parametrize("kernel", [coupler_path_jacobian, link_jacobian])
-@pytest.mark.parametrize("seed", range(4))
-def test_jacobians_are_limits_of_differences(kernel: Any, seed: int) -> None:
-    phi, dx, dy, q, branch = case(seed + 100)
-    _, jacobian = evaluated(kernel, 2, phi, dx, dy, q, branch)
-    h = 1e-6
-    for k, name in enumerate(COLUMNS):
-        ends = []
-        for step in (h, -h):
-            moved = q.copy()
-            if k < len(PLACES):
-                moved[k] += step
-            shift = [d + (step if name == label else 0.0) for d, label in ((dx, "dx"), (dy, "dy"))]
-            ends.append(evaluated(kernel, 2, phi, *shift, moved, branch)[0])
-        difference = ends[0] - ends[1]
-        if kernel is link_jacobian:
-            difference = np.angle(np.exp(1j * difference))
-        np.testing.assert_allclose(jacobian[k], difference / (2.0 * h), rtol=1e-7, atol=1e-8, err_msg=name)
 
 
 def test_with_and_without_derivatives_the_path_is_the_same() -> None:

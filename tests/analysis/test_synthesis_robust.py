@@ -58,11 +58,6 @@ class TestLiterature:
         )
         assert solution.evaluation.worst < 1e-6
 
-    def test_the_same_at_given_rotations(self) -> None:
-        task = syn.TimedPath(points=VERTICAL, rotation=pi / 6.0 * np.arange(1, 7))
-        solution = best(task, constraints=[syn.FullTurn(), syn.LargestLink(length=60.0)])
-        assert solution.error < 1e-3
-
 
 class TestShapes:
     def test_a_circle_is_that_of_the_crank_pin(self) -> None:
@@ -77,11 +72,6 @@ class TestShapes:
         solution = best(traced(line, closed=False, measure="distance", samples=24), candidates=1 << 12, starts=4)
         assert solution.evaluation.worst < 2e-3
         assert solution.rotation[-1] != solution.rotation[0]
-
-    def test_a_straight_line_at_even_steps_of_the_crank(self) -> None:
-        line = np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21)])
-        solution = best(syn.TimedPath(points=line, rotation=np.linspace(0.0, 2.0 * pi / 3.0, 21)))
-        assert solution.evaluation.worst < 0.01
 
     def test_a_leaf_with_a_cusp(self) -> None:
         leaf = np.column_stack([np.cos(T), 0.8 * np.sin(T) * np.sin(T / 2.0) ** 2])
@@ -185,20 +175,3 @@ class TestBeyondAFourBar:
         solution = best(traced(np.column_stack([z.real, z.imag]), samples=40))
         assert 0.1 < solution.evaluation.worst < 0.6
         assert 0.3 < solution.error < 1.0
-
-    def test_a_square_wave(self) -> None:
-        wave = np.array([(k // 2, (k // 2 + k % 2) % 2) for k in range(13)], dtype=float)
-        solution = best(traced(wave, closed=False, samples=40), candidates=1 << 12, starts=3)
-        assert 0.1 < solution.evaluation.worst < 2.0
-
-    @pytest.mark.slow
-    def test_a_spiral(self) -> None:
-        u = np.linspace(0.0, 6.0 * pi, 90)
-        spiral = np.column_stack([u * np.cos(u), u * np.sin(u)])
-        solution = best(traced(spiral, closed=False, samples=40), candidates=1 << 12, starts=3)
-        assert 1.0 < solution.evaluation.worst < 20.0
-
-    def test_points_at_random(self) -> None:
-        points = np.random.default_rng(1).normal(size=(20, 2))
-        solution = best(syn.TimedPath(points=points), constraints=[syn.LeastTransmission()])
-        assert 0.3 < solution.evaluation.rms < 2.0
