@@ -15,10 +15,8 @@ import click
 
 from linkwork import __version__
 
-from .codes import CHECK_FAILED as CHECK_FAILED
-from .codes import ENDED_EARLY as ENDED_EARLY
-from .codes import INTERRUPTED as INTERRUPTED
-from .codes import WRONG as WRONG
+#: Exit codes beside 0 and Click's 2, see above.
+WRONG, ENDED_EARLY, CHECK_FAILED, INTERRUPTED = 1, 3, 4, 130
 
 #: Every command by name: the module of this package that defines the command, and the command's line in ``linkwork --help``.
 COMMANDS = {

@@ -7,7 +7,7 @@ import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import reduce, wraps
+from functools import wraps
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,10 @@ from linkwork.errors import AssemblyError, InputError, Interrupted, LinkworkErro
 
 from ..libraries import MissingLibraryError, require
 from ..units import display_scale
-from .codes import CHECK_FAILED as CHECK_FAILED
-from .codes import ENDED_EARLY as ENDED_EARLY
-from .codes import INTERRUPTED as INTERRUPTED
-from .codes import WRONG as WRONG
+from . import CHECK_FAILED as CHECK_FAILED
+from . import ENDED_EARLY as ENDED_EARLY
+from . import INTERRUPTED as INTERRUPTED
+from . import WRONG as WRONG
 
 #: Standard output; if it is a file or a pipe, its width is large enough for the tables.
 console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, width=120)
@@ -46,6 +46,10 @@ def plain_text(text: str) -> Text:
 #: Patterns of a number in a sentence, and of a number with a unit in SI; numbers in quotes do not match.
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w)")
+
+
+#: Pattern of the beginning of a cell in a column of numbers.
+_NUMERIC = re.compile(r"[-+]?(\d|nan|inf)|none$|$")
 
 
 def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
@@ -95,20 +99,17 @@ def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
     def report(*arguments: Any, **options: Any) -> Any:
         try:
             return command(*arguments, **options)
-        except Interrupted as error:
-            text, style, code = str(error), "yellow", INTERRUPTED
-        except AssemblyError as error:
-            text, style, code = f"error: {in_units(str(error), display_scale)}", "red", WRONG
+        except (Interrupted, KeyboardInterrupt) as error:
+            print_error(str(error) or "interrupted")
+            sys.exit(INTERRUPTED)
         except LinkworkError as error:
-            text, style, code = f"error: {error}", "red", WRONG
+            text = in_units(str(error), display_scale) if isinstance(error, AssemblyError) else str(error)
         except OSError as error:
-            text, style, code = f"error: {error.filename or 'a file'}: {error.strerror or error}", "red", WRONG
+            text = f"{error.filename or 'a file'}: {error.strerror or error}"
         except MemoryError as error:
-            text, style, code = f"error: not enough memory: {error or 'ask for less at a time'}", "red", WRONG
-        except KeyboardInterrupt:
-            text, style, code = "interrupted", "yellow", INTERRUPTED
-        print_error(text, style)
-        sys.exit(code)
+            text = f"not enough memory: {error or 'ask for less at a time'}"
+        print_error(f"error: {text}", "red")
+        sys.exit(WRONG)
 
     return run
 
@@ -253,12 +254,12 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
     return written
 
 
-def save_plot(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
+def save_plot(wanted: bool, result: Any, path: str | Path, *more: Any, **options: Any) -> list[Path]:
     """Plot a result to a file if plots are ``wanted``, and return the paths of the files written."""
     from .. import figures
     from ..files import save_figure
 
-    return [save_figure(figures.plot(result, **options), path)] if wanted else []
+    return [save_figure(figures.plot(result, *more, **options), path)] if wanted else []
 
 
 plot_option = click.option("--plot/--no-plot", "--plots/--no-plots", default=True, help="Whether to write plots.")
@@ -269,12 +270,11 @@ def case_options(published: Iterable[str]) -> Callable[..., Any]:
 
     ``published`` are the names of published sets for the help text.
     """
-    options = (
-        click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
-        click.option("--published", metavar="NAME", help=f"A published set instead of a case: {', '.join(published)}."),
-        set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI"),
-    )
-    return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
+    case = click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
+    words = f"A published set instead of a case: {', '.join(published)}."
+    option = click.option("--published", metavar="NAME", help=words)
+    setting = set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
+    return lambda command: case(option(setting(command)))
 
 
 def number_or_text(text: str) -> bool | int | float | str:
@@ -412,9 +412,9 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     return case
 
 
-def say(text: str) -> None:
-    """Print a sentence in one line, without markup or colours."""
-    console.print(escape_controls(text), markup=False, highlight=False, soft_wrap=True)
+def say(text: str, style: str | None = None) -> None:
+    """Print a sentence in one line, without markup; the style is green or red for a verdict."""
+    console.print(escape_controls(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def show_table(
@@ -422,11 +422,10 @@ def show_table(
     headings: Sequence[str],
     rows: Iterable[Sequence[str]],
     *,
-    words: Collection[str] = (),
     unwrapped: Collection[str] = (),
     styles: Iterable[str | None] = repeat(None),
 ) -> None:
-    """Print a table.
+    """Print a table; columns of numbers are aligned to the right.
 
     Parameters
     ----------
@@ -435,16 +434,14 @@ def show_table(
         Headings of the columns.
     rows : iterable of sequence of str
         Cells of each row.
-    words : collection of str
-        Headings of the columns that contain words and are aligned to the left; all other columns contain numbers.
     unwrapped : collection of str
         Headings of the columns whose cells are not wrapped.
     styles : iterable of str, optional
         Styles of the rows, by their names in the library rich.
     """
-    grid = Table(title=plain_text(title), title_justify="left", show_header=bool(headings))
-    for heading in headings:
-        justify: Any = "left" if heading in words else "right"
+    grid, rows = Table(title=plain_text(title), title_justify="left", show_header=bool(headings)), list(rows)
+    for place, heading in enumerate(headings):
+        justify: Any = "right" if all(_NUMERIC.match(row[place]) for row in rows) else "left"
         # in a narrow terminal a long word is wrapped, not truncated
         grid.add_column(plain_text(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):

@@ -99,14 +99,14 @@ def print_solutions(
             for row, cell in zip(rows, cells):
                 row.append(cell)
     styles = [None if s.verdicts.sound and not what else "yellow" for s, what in zip(solutions, broken)]
-    common.show_table(title, headings, rows, words=("verdict", "also found", "violates"), styles=styles)
+    common.show_table(title, headings, rows, styles=styles)
 
 
 def print_best(best: Assessment) -> None:
     """Print the dimensions of a solution, and the effect of an error in each dimension."""
     head, *rows = best.dimensions
-    common.show_table("the first of them", head, rows, words=head[:1])
-    common.console.print(best.rounding, highlight=False, soft_wrap=True)
+    common.show_table("the first of them", head, rows)
+    common.say(best.rounding)
 
 
 def write_description_files(

@@ -11,7 +11,6 @@ import numpy as np
 from linkwork.errors import InputError
 
 from . import common
-from .codes import ENDED_EARLY
 from .design import print_best, print_solutions, read_overrides, write_description_files, write_linkages
 
 
@@ -71,7 +70,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         raise InputError("--crank-phase is for a function of the rocker: poses leave the crank's angle free")
     else:
         found = guidance(task, count or 6)
-    common.console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
+    common.say(f"{chosen.title}: {found.describe()}")
     folder = common.output_folder(out)
     written = []
     if found.solutions:
@@ -97,4 +96,4 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     common.print_paths(written)
     if not any(s.verdicts.sound for s in found.solutions):
         common.print_error(f"note: {found.describe()}")
-        sys.exit(ENDED_EARLY)
+        sys.exit(common.ENDED_EARLY)

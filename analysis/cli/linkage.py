@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..display import format_count
-from .common import out_option, report_errors, say, show_table
+from .common import out_option, print_paths, report_errors, save_plot, say, show_table
 
 if TYPE_CHECKING:
     from linkwork.mechanism import Mechanism
@@ -42,13 +42,10 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
     _print_structure(package)
     _print_reach(made)
     _print_dead_centres(package)
-    from ..figures import animate, plot
-    from ..files import save_figure
+    from ..figures import animate
 
-    folder = Path(out)
-    say(f"wrote {save_figure(plot(made), folder / f'{Path(file).stem}-linkage.png')}")
-    if animation:
-        say(f"wrote {animate(made, folder / f'{Path(file).stem}-linkage.gif')}")
+    stem = f"{Path(out) / Path(file).stem}-linkage"
+    print_paths([*save_plot(True, made, f"{stem}.png"), *([animate(made, f"{stem}.gif")] if animation else [])])
 
 
 def _print_structure(package: Package) -> None:
@@ -77,9 +74,8 @@ def _print_structure(package: Package) -> None:
             freedom = package.interface.drives[step.freedom]
             driven = f", driven as {freedom.table}" if freedom.table else ""
             rows.append((step.body, f"freedom {freedom.name}", f"from {step.parent} at {step.joint.name}{driven}"))
-    show_table(
-        "steps that compute the positions of the bodies", ("body", "by", "joints"), rows, words=("body", "by", "joints")
-    )
+    columns = ("body", "by", "joints")
+    show_table("steps that compute the positions of the bodies", columns, rows)
 
 
 def _print_reach(made: Mechanism) -> None:
@@ -96,9 +92,7 @@ def _print_reach(made: Mechanism) -> None:
         span = "turns" if found.turns else f"{' to '.join(ends)} {unit}"
         rows.append((freedom.coordinate, span, f"{degrees(asin(min(1.0, found.least))):.3g}"))
     columns = ("freedom", "range of motion", "least transmission angle [deg]")
-    show_table(
-        "range of motion, the other freedoms at their start", columns, rows, words=("freedom", "range of motion")
-    )
+    show_table("range of motion, the other freedoms at their start", columns, rows)
 
 
 def _print_dead_centres(package: Package) -> None:
@@ -115,4 +109,4 @@ def _print_dead_centres(package: Package) -> None:
         ]
     if rows:
         columns = ("freedom", "stands still", "at")
-        show_table("dead centres", columns, rows, words=columns)
+        show_table("dead centres", columns, rows)

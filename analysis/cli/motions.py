@@ -83,11 +83,9 @@ def basins(
         progress=console.is_terminal,
     )
     shares = [f"{picture.share(n):.1%} in motion {n + 1}" for n in range(len(picture.motions))]
-    console.print(
+    say(
         f"of {picture.ends.size} starts end {', '.join(shares)}, {picture.share(-1):.1%} at the limit of assembly, "
-        f"{picture.share(-2):.1%} in none of them",
-        highlight=False,
-        soft_wrap=True,
+        f"{picture.share(-2):.1%} in none of them"
     )
     if picture.fixed:
         varied = " and ".join(label.partition(" [")[0] for label in picture.labels)
@@ -117,7 +115,7 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
         amplitude = f"{size * orbit.amplitude:.5g} {unit} of {what}{format_rounds(orbit.rounds, ', ')}"
         shown = str(number) if stays else ""
         rows.append((shown, str(orbit.crank_turns), amplitude, word.value, f"{orbit.largest:.6g}"))
-    show_table(title, headings, rows, words=("stability",))
+    show_table(title, headings, rows)
     for periods, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
         if part.index != part.index_of_all:

@@ -11,7 +11,7 @@ import click
 from linkwork.errors import LinkworkError
 
 from ..files import check_ending, write_tables, write_text
-from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
+from ..probe import CRASH, SEVERITIES, WRONG, Finding, replay
 from ..probe import probe as probe_fmu
 from . import common
 
@@ -95,14 +95,12 @@ def probe(
             )  # fmt: skip
         findings = report.findings
         if out is not None:
-            common.print_paths([_write(report, Path(out))])
+            markdown = Path(out).suffix.lower() == ".md"
+            path = write_text(out, report.to_markdown()) if markdown else write_tables(out, report.to_dict())
+            common.print_paths([path])
         rows = [(o.check, o.interface, str(o.cases), str(o.calls), f"{o.seconds:.1f}", o.said) for o in report.outcomes]
-        common.show_table(
-            f"Probe of {report.fmu}",
-            ("check", "interface", "cases", "calls", "s", "result"),
-            rows,
-            words=("check", "interface", "result"),
-        )
+        headings = ("check", "interface", "cases", "calls", "s", "result")
+        common.show_table(f"Probe of {report.fmu}", headings, rows)
     _show(findings)
     failing = SEVERITIES if strict else (CRASH, WRONG)
     failed = [finding for finding in findings if finding.severity in failing]
@@ -112,13 +110,6 @@ def probe(
     common.say("no finding" if not findings else f"{len(findings)} questionable findings, nothing wrong")
 
 
-def _write(report: Report, path: Path) -> Path:
-    """Write the report as Markdown or JSON, according to the ending of the path, and return the path."""
-    if path.suffix.lower() != ".md":
-        return write_tables(path, report.to_dict())
-    return write_text(path, report.to_markdown())
-
-
 def _show(findings: Sequence[Finding]) -> None:
     """Print a table of the findings, with one row for each severity and kind."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
@@ -126,11 +117,9 @@ def _show(findings: Sequence[Finding]) -> None:
         kinds.setdefault((finding.severity, finding.kind), []).append(finding)
     rows = []
     for (severity, kind), members in kinds.items():
-        about = (
-            members[0].text if len(members) == 1 else f"{kind}: {', '.join(dict.fromkeys(m.subject for m in members))}"
-        )
+        subjects = ", ".join(dict.fromkeys(m.subject for m in members))
+        about = members[0].text if len(members) == 1 else f"{kind}: {subjects}"
         rows.append((severity, str(len(members)), about, members[0].replay))
     if rows:
-        common.show_table(
-            "Findings", ("severity", "kinds", "what", "replay"), rows, words=("severity", "what", "replay")
-        )
+        headings = ("severity", "kinds", "what", "replay")
+        common.show_table("Findings", headings, rows)

@@ -13,7 +13,6 @@ from linkwork.errors import InputError, ParameterError
 
 from ..units import RAD_S_PER_RPM
 from .common import (
-    console,
     out_option,
     output_folder,
     plot_option,
@@ -21,6 +20,8 @@ from .common import (
     print_paths,
     quantity,
     report_errors,
+    save_plot,
+    say,
     show_table,
 )
 
@@ -60,8 +61,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
       linkwork decrement record.csv --mass '600 g'
       linkwork decrement record.csv --time 't [s]' --position 'u [mm]' --unit mm --from '0.1 s' --friction
     """
-    from .. import figures
-    from ..files import read_record, save_figure, write_csv
+    from ..files import read_record, write_csv
     from ..numerics.decay import LEAST_SWING, fit_decay
 
     (heading, own), (t, x) = read_record(record, (time, position))
@@ -84,9 +84,8 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
             (name, f"{value:.6g}", f"{error:.2g}", its_unit)
             for name, value, error, its_unit in _result_rows(decay, moving, unit, size, si, options["friction"])
         ],
-        words=("", "unit"),
     )
-    console.print(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)", highlight=False)
+    say(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)")
     if not options["friction"]:
         with suppress(InputError):
             dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
@@ -98,11 +97,8 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
                 )
     stem = output_folder(out) / f"{Path(record).stem}-decrement"
     columns = {"time [s]": decay.time, f"position [{unit}]": decay.position, f"fit [{unit}]": decay.fitted}
-    written = [write_csv(f"{stem}.csv", columns)]
-    if plot:
-        drawn = figures.plot(decay, (t[kept], x[kept]), unit=unit, title=Path(record).name)
-        written.append(save_figure(drawn, f"{stem}.png"))
-    print_paths(written)
+    drawn = save_plot(plot, decay, f"{stem}.png", (t[kept], x[kept]), unit=unit, title=Path(record).name)
+    print_paths([write_csv(f"{stem}.csv", columns), *drawn])
 
 
 #: SI units of mass or moment of inertia, damping coefficient, stiffness and friction, by the SI unit of the position.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 import click
 
@@ -22,14 +22,6 @@ from . import common
 _ROUNDING = 1e-12
 #: Folder in which the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
-
-
-class CaseChanges(TypedDict):
-    """Options of the command line that replace entries of a case; None if an option is not given."""
-
-    stop_time: str | None
-    step: str | None
-    tolerance: float | None
 
 
 @click.command()
@@ -58,7 +50,7 @@ def run(
     method: str,
     out: str,
     plot: bool,
-    **given: Unpack[CaseChanges],
+    **given: str | float | None,
 ) -> None:
     """Run a CASE file (TOML or JSON) or a published set, and write the results as CSV and a plot.
 
@@ -69,8 +61,6 @@ def run(
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
       linkwork run --published table-3.1 --fmu build/FiveBarSlider-native.fmu --interface model-exchange
     """
-    from .. import figures
-    from ..files import save_figure
     from ..run import RunInterrupted, describe_masses, simulate
 
     changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
@@ -103,8 +93,7 @@ def run(
         result, interrupted = stopped.trajectory, True
     stem = common.output_folder(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
-    if plot and len(result) > 1:
-        written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
+    written += common.save_plot(plot and len(result) > 1, result, f"{stem}.png", title=chosen.title)
     _print_extremes(chosen.title, result)
     common.say(describe_masses(chosen.masses)[0])
     common.print_paths(written)
@@ -165,13 +154,10 @@ def _print_extremes(title: str, result: Any) -> None:
         least, greatest = (place(x.argmin()), place(x.argmax())) if varies else ("", "")
         rows.append((name, unit, numbers[0], least, numbers[1], greatest, numbers[2]))
     common.show_table(
-        f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
-        headings,
-        rows,
-        words=headings[:2],
+        f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)", headings, rows
     )
     for event in result.events:
-        common.console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
+        common.say(f"{event.name} at t = {event.time:.9g} s")
 
 
 def _places(result: Any) -> tuple[str, Callable[[Any], str]]:
@@ -282,15 +268,13 @@ def check(
             )
         if len(runs) > len(methods):
             headings = ("FMU", "interface", "in process", "largest difference in", "relative", "verdict")
-            common.show_table(
-                f"{case.title}, tolerance {tolerance:g}", headings, lines, words=headings[:4] + headings[5:],
-                styles=[None if good else "red" for good in verdicts],
-            )  # fmt: skip
+            styles = [None if good else "red" for good in verdicts]
+            common.show_table(f"{case.title}, tolerance {tolerance:g}", headings, lines, styles=styles)
         count += len(runs)
     if failed:
         common.print_error(f"check failed: {', '.join(failed)}", "red")
         sys.exit(common.CHECK_FAILED)
-    common.console.print(f"{count} of {count} checks pass", style="green", highlight=False)
+    common.say(f"{count} of {count} checks pass", style="green")
 
 
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
@@ -388,7 +372,6 @@ def _print_comparison(title: str, comparison: Any) -> None:
             (d.name, d.unit, f"{d.largest:.2e}", f"{d.rms:.2e}", f"{d.relative:.1e}", verdict)
             for d, verdict in zip(comparison.differences, verdicts)
         ],
-        words=("output", "unit", "verdict"),
         styles=[None if verdict == "pass" else "red" for verdict in verdicts],
     )
 
@@ -415,9 +398,9 @@ def info(what: str | None) -> None:
 
     if what is None:
         kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
-        common.show_table("mechanisms", ("name", "what it is", "FMU"), kinds, words=("name", "what it is", "FMU"))
+        common.show_table("mechanisms", ("name", "what it is", "FMU"), kinds)
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
-        common.show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
+        common.show_table("published sets", ("name", "source", "speed [rpm]"), sets)
         place = cache_root()
         common.say(f"linkwork {__version__}; compiled code is kept in {place}")
     elif what in PUBLISHED:
@@ -452,9 +435,7 @@ def _print_mechanism(mechanism: Any) -> None:
         *((v.name, v.unit, v.description) for v in parameters),
         *((name, unit, inputs.get(argument, "true or false")) for name, (argument, unit) in what.items()),
     ]
-    common.show_table(
-        mechanism.title, ("in a case file", "unit", "meaning"), rows, words=("in a case file", "unit", "meaning")
-    )
+    common.show_table(mechanism.title, ("in a case file", "unit", "meaning"), rows)
 
 
 def _print_parameters(title: str, parameters: Any) -> None:
@@ -469,17 +450,15 @@ def _print_parameters(title: str, parameters: Any) -> None:
     mechanism = find_mechanism(parameters)
     values = [(v, getattr(parameters, field_name(v.name))) for v in mechanism.mechanism_variables.values()]
     rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values]
-    common.show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
+    common.show_table(title, ("parameter", "value", "unit", "meaning"), rows)
     if mechanism is SLIDER_CRANK:
-        common.console.print(
-            "where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False
-        )
+        common.say("where it can be assembled, dead centres, stroke: linkwork slider-crank info")
     if mechanism is not FIVE_BAR:
         return
     p = parameters.constants()
     clearance = min(assembly_square(float(angle), 0.0, p) for angle in np.linspace(0.0, 2.0 * np.pi, 721))
     turns = "turns fully" if clearance > 0.0 else "does not turn fully"
-    common.console.print(f"with the slider at zero the crank {turns}", highlight=False)
+    common.say(f"with the slider at zero the crank {turns}")
 
 
 def _print_fmu(path: Path) -> None:
@@ -503,12 +482,9 @@ def _print_fmu(path: Path) -> None:
         f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}",
         ("variable", "causality", "start", "unit", "description"),
         [(v.name, v.causality, start(v), v.unit or "", v.description) for v in description.modelVariables],
-        words=("variable", "causality", "unit", "description"),
     )
     problems = validate_fmu(str(path))
-    common.console.print(
-        common.escape_controls("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False
-    )
+    common.say("; ".join(problems) or "valid", style="red" if problems else "green")
     if problems:
         sys.exit(common.CHECK_FAILED)
 
@@ -541,11 +517,9 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
         about = sentences()
         for number, study in STUDIES.items():
             place = ENTRIES[number].place
-            common.console.print(
-                f"{number:>8}  {study}{place and f' ({place})'}", highlight=False, markup=False, soft_wrap=True
-            )
+            common.say(f"{number:>8}  {study}{place and f' ({place})'}")
             for sentence in about[number]:
-                common.console.print(f"{'':>10}{sentence}", highlight=False, markup=False, soft_wrap=True)
+                common.say(f"{'':>10}{sentence}")
         return
     values = common.changes(settings, common.number_or_text, "rod.length='45 in'")
     if values and not numbers:
@@ -559,10 +533,8 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
         wrote = f": wrote {', '.join(p.name for p in paths)}" if paths else ""
         common.console.print(f"[bold]{number}[/bold]  {result.title}{wrote}", highlight=False)
         if values:
-            common.console.print(
-                "  with changed parameters: the verdicts are on the changed mechanism, not on the thesis"
-            )
+            common.say("  with changed parameters: the verdicts are on the changed mechanism, not on the thesis")
         if result.see:
-            common.console.print(f"  statements that concern it are judged at {result.see}", highlight=False)
+            common.say(f"  statements that concern it are judged at {result.see}")
         for statement in result.statements:
-            common.console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)
+            common.say(indent(str(statement), "  "))

@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwork.errors import LinkworkError
 
-from .common import console, print_error, show_table
+from .common import print_error, say, show_table
 from .driven import swing_unit
 
 #: Greatest number of parameters that are printed for each point.
@@ -60,13 +60,13 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
         of_text = f"{high:.3f}" if alone else f"{high:.4g} {length} of {what}"
         shown.append((word, f"{at:.2f}", _movers_text(place), of_text, _movers_text(amplitude)))
     if not rows:
-        console.print("no special point has a gradient that would show what moves it", highlight=False)
+        say("no special point has a gradient that would show what moves it")
         return []
     what, _, length = swing_unit(orbit)
     last = (f"amplitude [{length}]", f"amplitude of {what} there") if alone else ("amplitude", "the amplitude there")
     headings = ["", f"at [{unit}]", f"its place: {family.name}", *last]
     title = "parameters that move it most: percent per percent of the parameter"
-    show_table(title, headings, shown, words=headings[::2] if alone else headings[2:])
+    show_table(title, headings, shown)
     first = [f"amplitude of {what} [{length}]"] if alone else ["number of the free coordinate [1]", "amplitude [SI]"]
     headings = [f"at [{unit}]", *first]
     headings += [f"{quantity} by {name} [%/%]" for quantity in ("place", "amplitude") for name in names]

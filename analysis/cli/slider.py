@@ -97,9 +97,7 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     headings = ("mechanism", "result")
     rows = [(step.mechanism, step.reason) for step in found.steps]
     styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
-    common.show_table(
-        f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, words=headings, styles=styles
-    )
+    common.show_table(f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, styles=styles)
     if not found.met:
         common.print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
@@ -159,7 +157,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
         rows.append((words, *quality_cells(s)[::2], *motion, format_transmission(s.verdicts)))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
     title = f"{title}: {quality_name(task)}"
-    common.show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
+    common.show_table(title, headings, rows, unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
 def _write_solution(solution: Solution, folder: Path, case: SliderCase, plot: bool) -> list[Path]:
@@ -221,7 +219,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plot: bool) 
 
 
 def _print_rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    common.console.print(title, style="italic", highlight=False, markup=False, soft_wrap=True)
+    common.say(title, style="italic")
     grid = Table(show_header=False)
     grid.add_column()
     grid.add_column(justify="right")

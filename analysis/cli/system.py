@@ -69,12 +69,7 @@ def new(name: str | None, file: str | None) -> None:
 
     known = library()
     if name is None:
-        common.show_table(
-            "systems",
-            ("name", "what"),
-            [(n, read_tables(p)["title"]) for n, p in known.items()],
-            words=("name", "what"),
-        )
+        common.show_table("systems", ("name", "what"), [(n, read_tables(p)["title"]) for n, p in known.items()])
         return
     if name not in known:
         raise unknown_name(name, known, f"system {name!r}")
@@ -149,7 +144,7 @@ def run(
         values = factor * found.unwrapped(name)
         rows.append((name, unit, f"{values.min():.6g}", f"{values.max():.6g}", f"{values[-1]:.6g}"))
     title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
-    common.show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows, words=("output", "unit"))
+    common.show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows)
     for note in found.notes:
         common.print_error(f"note: {note}")
     if found.powers:

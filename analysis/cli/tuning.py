@@ -74,9 +74,9 @@ def _print(title: str, tuned: Any) -> None:
         changed = change if after != before else "none"
         rows.append((name, unit, f"{factor * before:.7g}", f"{factor * after:.7g}", changed))
     headings = ("parameter", "unit", "before", "after", "change")
-    common.show_table(f"{title}: the least change", headings, rows, words=headings[:2])
+    common.show_table(f"{title}: the least change", headings, rows)
     headings = ("requirement", "wished", "before", "after", "")
     rows = [(r.name, r.wished, r.before.text, r.after.text, "met" if r.met else "not met") for r in tuned.requirements]
     styles = [None if r.met else "yellow" for r in tuned.requirements]
-    common.show_table("requirements", headings, rows, words=headings, styles=styles)
+    common.show_table("requirements", headings, rows, styles=styles)
     common.say(f"verified: {tuned.verification}" if tuned.met else f"computed anew: {tuned.verification}")

@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from .common import CHECK_FAILED, console, print_error, report_errors, show_table, tolerance_option
+from .common import CHECK_FAILED, console, print_error, report_errors, say, show_table, tolerance_option
 
 
 @click.command()
@@ -52,7 +52,6 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
         f"{fmu}, {interface}",
         ("experiment", "variable", "at [s]", "value", "reference", "relative", "allowed", "verdict"),
         rows,
-        words=("experiment", "variable", "verdict"),
         unwrapped=("experiment", "variable", "value", "reference", "verdict"),
         styles=[None if row[-1] == "pass" else "red" for row in rows],
     )
@@ -64,7 +63,7 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
         sys.exit(CHECK_FAILED)
     if alone := [outcome.experiment for outcome in outcomes if not outcome.deviations]:
         print_error(f"note: without reference results, so that nothing was compared: {', '.join(alone)}")
-    console.print(f"{len(outcomes)} of {len(outcomes)} experiments pass", style="green", highlight=False)
+    say(f"{len(outcomes)} of {len(outcomes)} experiments pass", style="green")
 
 
 def _rebuild(fmu: str) -> None:
@@ -74,13 +73,11 @@ def _rebuild(fmu: str) -> None:
     with console.status("building"):
         parts = list(rebuild_fmu(fmu))
     rows = [(part.what, part.text, "same" if part.same else "DIFFERS") for part in parts]
-    show_table(
-        fmu, ("part", "compared with", "verdict"), rows, words=("part", "compared with", "verdict"),
-        styles=[None if part.same else "red" for part in parts],
-    )  # fmt: skip
+    styles = [None if part.same else "red" for part in parts]
+    show_table(fmu, ("part", "compared with", "verdict"), rows, styles=styles)
     if not all(part.same for part in parts):
         print_error(
             "rebuild failed: the FMU differs from a build from its sources with the programs installed here", "red"
         )
         sys.exit(CHECK_FAILED)
-    console.print("the FMU is the same as a build from its sources", style="green", highlight=False)
+    say("the FMU is the same as a build from its sources", style="green")

@@ -111,6 +111,7 @@ def resonance(
         ResponseInterrupted,
         default_variable,
         frequency_response,
+        natural_frequency,
         parameter_unit,
         speed_names,
         with_isolas,
@@ -126,7 +127,9 @@ def resonance(
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
-    natural, modes = _natural_frequency(parameters), _find_modes(chosen.case, over_speed)
+    natural, modes = None, _find_modes(chosen.case, over_speed)
+    with suppress(LinkworkError):  # the mechanism may have no spring
+        natural = natural_frequency(parameters)
     ends = _range_ends(parameters, vary, low, high, natural, modes)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
     start = chosen.start(drive)
@@ -163,16 +166,6 @@ def resonance(
     chosen.finish(written, response.problems, interrupted=interrupted)
 
 
-def _natural_frequency(parameters: Any) -> float | None:
-    """Return the natural frequency (rad/s) of the spring alone; None if the mechanism has none."""
-    from ..periodic import natural_frequency
-
-    try:
-        return natural_frequency(parameters)
-    except LinkworkError:
-        return None
-
-
 def _find_modes(case: Any, over_speed: bool) -> Any:
     """Return the natural modes of a case about its equilibrium, or the LinkworkError that says why there are none.
 
@@ -196,10 +189,9 @@ def _find_modes(case: Any, over_speed: bool) -> Any:
 def _print_natural_frequencies(natural: float | None, modes: Any) -> None:
     """Print the natural frequency of the spring alone (rad/s), if there is one, and a table of the natural modes."""
     if natural is not None:
-        common.console.print(
+        common.say(
             f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
-            f"{natural:.5g} rad/s",
-            highlight=False,
+            f"{natural:.5g} rad/s"
         )
     if isinstance(modes, LinkworkError):
         common.say(f"no natural frequencies about the equilibrium: {modes}")
@@ -213,7 +205,7 @@ def _print_natural_frequencies(natural: float | None, modes: Any) -> None:
         ]
         title = "natural frequencies of small vibrations about the equilibrium, the crank held, over its turn"
         headings = ("mostly of", "least [rpm]", "mean [rpm]", "greatest [rpm]", "damping ratio")
-        common.show_table(title, headings, rows, words=headings[:1])
+        common.show_table(title, headings, rows)
     if modes.unstable:
         common.say(f"the equilibrium is unstable at {modes.unstable} of {len(modes.equilibria)} crank positions")
 
@@ -266,7 +258,7 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
     family = response.family
     varied = "speed" if speed_names(find_mechanism(family.parameters)) == (family.name,) else family.name
     table = f"{title}: how it moves at each {varied}, and where that jumps or becomes unstable (branches of periodic motions)"
-    common.show_table(table, headings, rows, words=headings[-1:])
+    common.show_table(table, headings, rows)
 
 
 def _normal_form_in_words(family: Any, special: Any) -> str:
@@ -287,9 +279,7 @@ def _has_dry_friction(parameters: Any) -> bool:
 def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     if not entries:
-        common.console.print(
-            "no maximum or minimum of the amplitude inside the range stands out by a thousandth", highlight=False
-        )
+        common.say("no maximum or minimum of the amplitude inside the range stands out by a thousandth")
         return
     orbit = response.branches[0].orbits[0]
     what, size, length = swing_unit(orbit)
@@ -298,27 +288,17 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     amplitude = (f"amplitude [{length}]",) if alone else ("of", "amplitude")
     headings = ("", f"at [{unit}]", *amplitude, "motion", *(f"{name} [{length}]" for name in names))
     if table is not None and _has_dry_friction(response.family.parameters):
-        common.console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
+        common.say("the approximations are of the mechanism without its Coulomb friction")
     entries.sort(key=lambda entry: entry[1].parameter)
     beside = [] if table is None else list(table.at([extremum.parameter for _, extremum in entries]).values())
-    rows = [
-        (
-            word,
-            f"{factor * extremum.parameter:.2f}",
-            *([f"{size * extremum.amplitude:.3f}"] if alone else _coordinate_and_amplitude(extremum)),
-            extremum.stability.value,
-            *(f"{size * values[number]:.3f}" for values in beside),
-        )
-        for number, (word, extremum) in enumerate(entries)
-    ]
+    rows = []
+    for number, (word, extremum) in enumerate(entries):
+        of, scale, its_unit = swing_unit(extremum.orbit, extremum.coordinate)
+        cells = [f"{size * extremum.amplitude:.3f}"] if alone else [of, f"{scale * extremum.amplitude:.4g} {its_unit}"]
+        approximated = [f"{size * values[number]:.3f}" for values in beside]
+        rows.append((word, f"{factor * extremum.parameter:.2f}", *cells, extremum.stability.value, *approximated))
     title = f"where the amplitude of {what} is largest and least" if alone else "where amplitudes are largest and least"
-    common.show_table(title, headings, rows, words=("", "of", "motion"))
-
-
-def _coordinate_and_amplitude(extremum: Any) -> list[str]:
-    """Return the name of the coordinate of an extremum, and its amplitude with the unit."""
-    what, size, unit = swing_unit(extremum.orbit, extremum.coordinate)
-    return [what, f"{size * extremum.amplitude:.4g} {unit}"]
+    common.show_table(title, headings, rows)
 
 
 def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
@@ -345,7 +325,7 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
         common.say(f"no {words} to avoid: one stable motion throughout, and {peak}")
     else:
         rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.words) for a in ranges]
-        common.show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
+        common.show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows)
     for jump in response.jumps:
         side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")
         after = " or ".join(f"{size * amplitude:.4g}" for amplitude in jump.after)
@@ -504,7 +484,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begi
     friction = _has_dry_friction(parameters)
     if drive.speed_drive and not friction and find_mechanism(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
-    common.console.print("\n".join(lines), highlight=False, soft_wrap=True)
+    common.say("\n".join(lines))
     if friction:
         common.print_error(
             "note: Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
@@ -565,9 +545,9 @@ def _print_regions(found: Any) -> None:
         rows.append((traced.motion, traced.kind.value, *spans, ends))
     if rows:
         headings = ("motion", "kind", *_headings(x, y), "ends because")
-        common.show_table("boundaries of instability", headings, rows, words=headings)
+        common.show_table("boundaries of instability", headings, rows)
     for removal in found.removals:
-        common.console.print(removal, highlight=False, soft_wrap=True)
+        common.say(removal)
 
 
 def _headings(*axes: Any) -> list[str]:
@@ -590,4 +570,4 @@ def _print_runs(found: Any) -> None:
         )
         for run, c in ((run, run.confirmation) for run in found.runs)
     ]
-    common.show_table("confirmed by long nonlinear runs", headings, rows, words=headings)
+    common.show_table("confirmed by long nonlinear runs", headings, rows)

@@ -38,6 +38,8 @@ class Context:
         Name of the check.
     avoided : frozenset of str
         Keys of the forbidden calls that crashed an earlier process; they are not tried again.
+    faults : list
+        Faults that the forbidden calls try, once they are listed.
     """
 
     model: Model
@@ -49,6 +51,7 @@ class Context:
     seed: int
     check: str
     avoided: frozenset[str] = frozenset()
+    faults: list[Any] = field(default_factory=list)
     _shown: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def session(self) -> Session:

@@ -8,11 +8,9 @@ import random
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fmpy import fmi2
-
 from .model import CONDITIONS, Variable
 from .session import ProbeError, Session
-from .walk import access, value
+from .walk import access, read_update, update_arguments, value
 
 #: Values of all variables at one time: the bytes of the variables of each group, such as Real or Float64.
 Values = dict[str, bytes]
@@ -78,17 +76,10 @@ class Run:
 
     def _update(self) -> bool:
         """Update the discrete states once; return whether another update is needed."""
-        if self.model.version == 2:
-            info = fmi2.fmi2EventInfo()
-            self.session.need("NewDiscreteStates", info)
-            needed, defined, time = info.newDiscreteStatesNeeded, info.nextEventTimeDefined, info.nextEventTime
-        else:
-            flags = [ctypes.c_bool() for _ in range(5)]
-            at = ctypes.c_double()
-            self.session.need("UpdateDiscreteStates", *flags, at)
-            needed, defined, time = flags[0].value, flags[4].value, at.value
-        self.next_event = time if defined else math.inf
-        return bool(needed)
+        arguments = update_arguments(self.model.version)
+        self.session.need("NewDiscreteStates" if self.model.version == 2 else "UpdateDiscreteStates", *arguments)
+        needed, _, self.next_event = read_update(self.model.version, arguments)
+        return needed
 
     def set(self, values: Inputs) -> None:
         """Set the scalar variables among ``values`` to their values in this mapping; leave out arrays."""

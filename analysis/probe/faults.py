@@ -18,7 +18,6 @@ from fmpy import fmi2, fmi3
 
 from .findings import QUESTIONABLE, WRONG
 from .model import CONDITIONS, Model, Variable
-from .session import WARNING
 from .walk import Walk, access, byte_array, references
 
 ACCEPT = "accept"
@@ -274,8 +273,3 @@ def bad_starts(model: Model) -> list[BadStart]:
     else:
         starts += [BadStart("NULL logger", ACCEPT, 6, fmi3.fmi3LogMessageCallback())]
     return starts
-
-
-def is_refused(status: int) -> bool:
-    """Return whether a status, returned by an FMI function, means that the call was refused: worse than Warning."""
-    return status > WARNING

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 CRASH, WRONG, QUESTIONABLE = "crash", "wrong", "questionable"
 SEVERITIES = (CRASH, WRONG, QUESTIONABLE)
 
 
-class Note(Protocol):
-    """A function that takes a finding: its severity, a key (subject and kind of the finding), and a sentence."""
-
-    def __call__(self, severity: str, key: str, text: str) -> None: ...
+#: A function that takes a finding: its severity, a key (subject and kind of the finding), and a sentence.
+Note = Callable[[str, str, str], None]
 
 
 @dataclass(slots=True, kw_only=True)

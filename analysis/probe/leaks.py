@@ -32,21 +32,8 @@ _LEAST = Memory(heap=16 * 1024, resident=192 * 1024)
 class _MallInfo(ctypes.Structure):
     """The structure that glibc's mallinfo2 returns; its fields are sizes."""
 
-    _fields_ = [
-        (name, ctypes.c_size_t)
-        for name in [
-            "arena",
-            "ordblks",
-            "smblks",
-            "hblks",
-            "hblkhd",
-            "usmblks",
-            "fsmblks",
-            "uordblks",
-            "fordblks",
-            "keepcost",
-        ]
-    ]
+    _names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
+    _fields_ = [(name, ctypes.c_size_t) for name in _names.split()]
 
 
 def memory() -> Memory | None:

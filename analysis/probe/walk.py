@@ -218,15 +218,6 @@ class Walk:
         """Return a random legal value for each element of each variable."""
         return [value(self.rng, v) for v in variables for _ in range(v.size)]
 
-    def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
-        """Return a random unknown and a known on which this unknown depends; None if there is no such known."""
-        if not pairs:
-            return None
-        unknown, knowns = self.rng.choice(pairs)
-        if self.model.interface == "cs":  # in co-simulation only inputs are knowns
-            knowns = tuple(known for known in knowns if known.causality == "input")
-        return (unknown, self.rng.choice(knowns)) if knowns else None
-
 
 def access(model: Model, variables: Sequence[Variable], values: Sequence[Any] = ()) -> list[Any]:
     """Return the arguments of a call that gets variables of one group, or sets them if there are ``values``."""
@@ -303,16 +294,17 @@ def _set_states(walk: Walk) -> list[Any] | None:
     return arguments
 
 
-def _set_time(walk: Walk) -> list[Any]:
-    return [min(walk.time + walk.model.step * walk.rng.random(), walk.next_event)]
-
-
 def _derivative(transposed: bool) -> Callable[[Walk], list[Any] | None]:
     def arguments(walk: Walk) -> list[Any] | None:
-        chosen = walk.pick(walk.model.dependencies)
-        if chosen is None or walk.state in ("instantiated", "ready", "initialization"):
+        if not walk.model.dependencies:
             return None
-        return derivative_arguments(walk.model.version, [chosen[0]], [chosen[1]], [1.0], transposed)
+        unknown, knowns = walk.rng.choice(walk.model.dependencies)
+        if walk.model.interface == "cs":  # in co-simulation only inputs are knowns
+            knowns = tuple(known for known in knowns if known.causality == "input")
+        known = [walk.rng.choice(knowns)] if knowns else []
+        if not known or walk.state in _BEFORE:
+            return None
+        return derivative_arguments(walk.model.version, [unknown], known, [1.0], transposed)
 
     return arguments
 
@@ -349,10 +341,17 @@ def _time_derivatives(causality: str) -> Callable[[Walk], list[Any] | None]:
     return arguments
 
 
-def _update_arguments(walk: Walk) -> list[Any]:
-    if walk.model.version == 2:
-        return [fmi2.fmi2EventInfo()]
-    return [*(ctypes.c_bool() for _ in range(5)), ctypes.c_double()]
+def update_arguments(version: int) -> list[Any]:
+    """Return the arguments of a call that updates the discrete states."""
+    return [fmi2.fmi2EventInfo()] if version == 2 else [*(ctypes.c_bool() for _ in range(5)), ctypes.c_double()]
+
+
+def read_update(version: int, arguments: Sequence[Any]) -> tuple[bool, bool, float]:
+    """Return what an update says: whether another is needed, whether the run must end, and the time of the next event."""
+    info = arguments[0]
+    values = [getattr(info, name) for name, _ in info._fields_] if version == 2 else [a.value for a in arguments]
+    needed, terminate, _, _, defined, time = values
+    return bool(needed), bool(terminate), time if defined else math.inf
 
 
 def _completed_step_arguments(walk: Walk) -> list[Any]:
@@ -380,21 +379,20 @@ _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
     "getnumberofcontinuousstates": lambda walk: [ctypes.c_size_t()],
     "getnumberofeventindicators": lambda walk: [ctypes.c_size_t()],
     "setcontinuousstates": _set_states,
-    "settime": _set_time,
+    "settime": lambda walk: [min(walk.time + walk.model.step * walk.rng.random(), walk.next_event)],
     "getdirectionalderivative": _derivative(False),
     "getadjointderivative": _derivative(True),
     "getrealoutputderivatives": _time_derivatives("output"),
     "getoutputderivatives": _time_derivatives("output"),
     "setrealinputderivatives": _time_derivatives("input"),
-    "newdiscretestates": _update_arguments,
-    "updatediscretestates": _update_arguments,
+    "newdiscretestates": lambda walk: update_arguments(walk.model.version),
+    "updatediscretestates": lambda walk: update_arguments(walk.model.version),
     "completedintegratorstep": _completed_step_arguments,
     "getstatus": lambda walk: [fmi2.fmi2DoStepStatus, ctypes.c_int()],
     "getrealstatus": lambda walk: [fmi2.fmi2LastSuccessfulTime, ctypes.c_double()],
     "getbooleanstatus": lambda walk: [fmi2.fmi2Terminated, ctypes.c_int()],
     "getstringstatus": lambda walk: [fmi2.fmi2PendingStatus, ctypes.c_char_p()],
     "getintegerstatus": lambda walk: [fmi2.fmi2LastSuccessfulTime, ctypes.c_int()],
-    "cancelstep": lambda walk: [],
 }  # fmt: skip
 
 
@@ -431,13 +429,8 @@ def _follow_free(walk: Walk, arguments: Sequence[Any]) -> None:
 
 
 def _follow_update(walk: Walk, arguments: Sequence[Any]) -> None:
-    info = arguments[0]
-    fields = (
-        [getattr(info, name) for name, _ in info._fields_] if walk.model.version == 2 else [a.value for a in arguments]
-    )
-    needed, terminate, _, _, defined, time = fields
+    needed, terminate, walk.next_event = read_update(walk.model.version, arguments)
     walk.state = "event" if needed else "settled"
-    walk.next_event = time if defined else math.inf
     walk.forced = "Terminate" if terminate else None
 
 

@@ -122,20 +122,13 @@ class System:
             rows = {row.name: row.unit for row in CONTROLLERS[table.controller].rows} | {"sample_time": "s"}
             return Member(name=name, values=_read_values(table.values, rows, where), controller=table.controller)
         case = self._case(table)
-        parameters, initial = case.parameters, case.initial
-        mechanism = find_mechanism(parameters)
+        mechanism = find_mechanism(case.parameters)
         inputs = self._inputs(name, mechanism, case.inputs)
-        values = {fmi_name(key): float(value) for key, value in asdict(parameters).items()}
-        values |= {f"initial.{key}": float(value) for key, value in asdict(initial).items()}
+        values = {fmi_name(key): float(value) for key, value in asdict(case.parameters).items()}
+        values |= {f"initial.{key}": float(value) for key, value in asdict(case.initial).items()}
         units = {v.name: v.unit or "1" for v in mechanism.variables if v.causality in ("parameter", "input")}
-        return Member(
-            name=name,
-            values=values
-            | inputs
-            | self._modes(name, mechanism, case.inputs)
-            | _read_values(table.values, units, where),
-            mechanism=mechanism,
-        )
+        values |= inputs | self._modes(name, mechanism, case.inputs) | _read_values(table.values, units, where)
+        return Member(name=name, values=values, mechanism=mechanism)
 
     def _case(self, table: PartTable) -> Case:
         """Return the case of a part."""
@@ -245,7 +238,8 @@ class Member:
             return build_controller(self.controller, folder)
         shell = sorted((SOURCES / "native").glob("*.[ch]"))
         sources = [*(Path(str(module.__file__)) for module in self.mechanism.modules), *shell]
-        key = _short_hash(*(path.read_text(encoding="utf-8") for path in sources), __version__)
+        texts = [*(path.read_text(encoding="utf-8") for path in sources), __version__]
+        key = hashlib.sha256("\0".join(texts).encode()).hexdigest()[:8]
         target = folder / key / kinds[fmi].file_name(self.mechanism)
         return target if target.is_file() else build_native(self.mechanism, kinds[fmi], target.parent)
 
@@ -267,18 +261,13 @@ def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str
     for key in values:
         if key not in units:
             raise unknown_name(key, units, f"variable {key}, named in {where}")
-    return {key: _convert_to_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
 
+    def convert(value: Any, unit: str, name: str) -> float:
+        # values with other than mechanical units, which controllers have, are given in SI
+        electric = {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1}))
+        return _number(value, name) if electric else quantity(value, unit, name)
 
-def _convert_to_unit(value: Any, unit: str, name: str) -> float:
-    # values with other than mechanical units, which controllers have, are given in SI
-    return (
-        quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)
-    )
-
-
-def _short_hash(*texts: str) -> str:
-    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:8]
+    return {key: convert(value, units[key], f"{where}.{key}") for key, value in values.items()}
 
 
 def load_system(path: str | Path) -> System:

@@ -249,10 +249,6 @@ class Wiring:
         others += [self.connections[end]] if end in self.connections else []
         return next((self.port(one).unit for one in (end, *others) if self.port(one).unit), "")
 
-    def _names(self, source: End, target: End) -> tuple[str, str]:
-        """Return the names of the unit of a connection, which may differ at its ends, such as N.m and Nm."""
-        return self.unit(source), self.unit(target)
-
     def rate_input(self, end: End) -> End | None:
         """Return the input for the time derivative of a given input: in the same table, with the unit divided by seconds."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
@@ -327,12 +323,16 @@ class Wiring:
 
     def bonds(self) -> list[Bond]:
         """Return the power bonds: unique pairs of an effort and a flow in opposite directions between two parts."""
+        # the names of a unit may differ at the ends of a connection, such as N.m and Nm
         found = [
             Bond(source, target, flow, flow_to)
             for target, source in self.connections.items()
             for flow_to, flow in self.connections.items()
             if (flow.part, flow_to.part) == (target.part, source.part)
-            and any(units in _POWERS for units in product(self._names(source, target), self._names(flow, flow_to)))
+            and any(
+                pair in _POWERS
+                for pair in product((self.unit(source), self.unit(target)), (self.unit(flow), self.unit(flow_to)))
+            )
         ]
         efforts, flows = [bond.effort_to for bond in found], [bond.flow_to for bond in found]
         return [b for b in found if efforts.count(b.effort_to) == 1 and flows.count(b.flow_to) == 1]

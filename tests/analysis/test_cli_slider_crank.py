@@ -50,26 +50,29 @@ class TestInfo:
         assert rows(result.output)[f"{outer:.2f}"][-1] == "outer"
         assert rows(result.output)[f"{inner:.2f}"][-1] == "inner"
 
-    def test_units(self, linkwork):
-        inch, si = linkwork("info", "--units", "inch").output, linkwork("info").output
-        assert rows(inch)["shift S1"] == ["3.5 in"]
-        assert rows(si)["shift S1"] == ["88.9 mm"]
-        assert rows(si)["crank a1, rod a2"] == ["304.8 mm, 1270 mm"]
-
-    def test_a_crank_that_cannot_turn_fully(self, linkwork):
-        """At 270 deg and a4 = 30, S1 = 40 the pin is sqrt((12 c + 30)^2 + 40^2) from the guide: 50 at c = 0, 58 at c = 1."""
-        result = linkwork("info", "--offset", "30 in", "--shift", "40 in", "--units", "inch")
-        assert result.exit_code == 0
-        assert rows(result.output)["the crank"] == ["does not turn fully"]
-        assert rows(result.output)["least assembly margin"] == ["-8 in at 0.00 deg"]
-        assert "range 90.00 deg to 270.00 deg" in result.output
-
-    def test_a_groove(self, linkwork):
-        settings = ("--set", "groove.amplitude=3 in", "--set", "groove.ratio=2")
-        result = linkwork("info", "--groove", "shaft", *settings, "--units", "inch")
-        assert rows(result.output)["shift S1"] == ["made by the groove"]
-        assert "SS1 = 3 in, alpha = 2" in result.output
-        assert "does not turn" not in result.output
+    @pytest.mark.parametrize(
+        ("words", "cells", "said"),
+        [
+            ("", {"shift S1": "88.9 mm", "crank a1, rod a2": "304.8 mm, 1270 mm"}, ""),
+            ("--units inch", {"shift S1": "3.5 in"}, ""),
+            # at 270 deg the pin is sqrt((12 c + 30)^2 + 40^2) from the guide: 50 at c = 0, 58 at c = 1
+            (
+                "--offset '30 in' --shift '40 in' --units inch",
+                {"the crank": "does not turn fully", "least assembly margin": "-8 in at 0.00 deg"},
+                "range 90.00 deg to 270.00 deg",
+            ),
+            (
+                "--groove shaft --set 'groove.amplitude=3 in' --set groove.ratio=2 --units inch",
+                {"shift S1": "made by the groove", "the crank": "turns fully"},
+                "SS1 = 3 in, alpha = 2",
+            ),
+        ],
+    )
+    def test_the_table(self, linkwork, words, cells, said):
+        result = linkwork("info", *shlex.split(words))
+        assert result.exit_code == 0, result.output
+        assert {name: rows(result.output)[name] for name in cells} == {name: [cell] for name, cell in cells.items()}
+        assert said in result.output
 
 
 class TestParameterFiles:

@@ -23,7 +23,6 @@ from analysis.synthesis import (
     SynthesisInterrupted,
     TimedPath,
     described_case,
-    evaluate,
     synthesize,
     turn,
 )
@@ -220,19 +219,10 @@ def test_the_written_system_has_the_plant_and_the_load_of_the_tracking(linkwork,
 
 
 def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
-    make = {
-        "slider_damping": "20 N*s/m",
-        "slider_stiffness": "300 N/m",
-        "slider_coulomb_friction": "2 N",
-        "slider_mass": "1 kg",
-    }
-    made = read(tmp_path, tables(make=make)).synthesis.make.sliding_five_bar(BASE)
-    assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
-        20,
-        300,
-        2,
-        1,
-    )
+    make = {"damping": "20 N*s/m", "stiffness": "300 N/m", "coulomb_friction": "2 N", "mass": "1 kg"}
+    given = {f"slider_{name}": text for name, text in make.items()}
+    made = read(tmp_path, tables(make=given)).synthesis.make.sliding_five_bar(BASE)
+    assert [getattr(made, name) for name in given] == [20, 300, 2, 1]
     # a pivot that is to move is not held, unlike that of a four-bar
     free = read(tmp_path, tables(make={})).synthesis.make.sliding_five_bar(BASE)
     assert free.slider_stiffness == free.slider_damping == 0.0
@@ -283,10 +273,8 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
     result = synthesize(wanted, constraints=found.synthesis.constraints, search=Search(starts=4, candidates=4096))
     assert first.error == pytest.approx(result.best.error, rel=1e-12)
     result.to_csv(tmp_path / "solutions.csv")
-    for rank in range(1, len(result.solutions) + 1):
-        assert (
-            linkage_from_csv(tmp_path / "solutions.csv", rank).values() == result.solutions[rank - 1].linkage.values()
-        )
+    for rank, solution in enumerate(result.solutions, start=1):
+        assert linkage_from_csv(tmp_path / "solutions.csv", rank).values() == solution.linkage.values()
     case["linkage"] = {"file": "solutions.csv"}
     assert read(tmp_path, case).find_four_bar().error == pytest.approx(first.error, rel=1e-12)
     done = linkwork(case, "--no-plots")
@@ -381,6 +369,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
     ("change", "words"),
     [
         ({"slyder": {}}, "slyder"),
+        ({"slider": None}, "slider"),
         ({"trade_off": {"over": "size", "limits": ["1 m", "2 m"]}}, "trade_off"),
         ({"slider": {"harmonic": 2}}, "slider.harmonic"),
         ({"slider": {"harmonics": -1}}, "slider.harmonics"),
@@ -419,7 +408,8 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
     ],
 )
 def test_bad_input_is_one_sentence(linkwork, tmp_path, change: dict[str, Any], words: str) -> None:
-    result = linkwork(tables() | change, "--no-plots")
+    case = {name: table for name, table in (tables() | change).items() if table is not None}
+    result = linkwork(case, "--no-plots")
     assert result.exit_code == cli.WRONG, result.output
     assert words in result.output
     assert result.output.startswith("error: ")
@@ -427,25 +417,12 @@ def test_bad_input_is_one_sentence(linkwork, tmp_path, change: dict[str, Any], w
     assert not (tmp_path / "out").exists()
 
 
-def test_without_slider_or_strategy_nothing_is_asked(linkwork) -> None:
-    case = tables()
-    del case["slider"]
-    result = linkwork(case)
-    assert result.exit_code == cli.WRONG
-    assert "slider" in result.output
-
-
 def test_a_list_of_linkages_is_checked(tmp_path) -> None:
     good = tmp_path / "solutions.csv"
     task = TimedPath(points=BASE.path(turn(12)))
-    assert evaluate(task, BASE).error < 1e-20
     synthesize(task, search=Search(starts=2, candidates=1024)).to_csv(good)
     with pytest.raises(InputError, match="none of rank 99"):
         linkage_from_csv(good, 99)
-    text = good.read_text(encoding="utf-8")
-    good.write_text(text.replace("crank_length [m]", "crank"), encoding="utf-8")
-    with pytest.raises(InputError, match="not a list of linkages"):
-        linkage_from_csv(good)
 
 
 def test_the_motion_is_read_with_its_units(tmp_path) -> None:

@@ -115,10 +115,9 @@ def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
     assert first == second
     assert not list(Path("a").glob("*.png"))
     assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
-    for option, value, code, said in (("--jobs", 0, 2, "0 is neither -1, for all, nor a number of cores"),):
-        result = linkwork("synthesize", "case.toml", option, value)
-        assert result.exit_code == code
-        assert said in " ".join(result.stderr.split())
+    result = linkwork("synthesize", "case.toml", "--jobs", 0)
+    assert result.exit_code == 2
+    assert "0 is neither -1, for all, nor a number of cores" in " ".join(result.stderr.split())
     values = np.genfromtxt("a/solutions.csv", delimiter=",", names=True, deletechars="")
     assert np.max(values["ground_length_[m]"]) <= 0.45 + 1e-6
 
@@ -482,15 +481,8 @@ def test_bounds_constraints_and_the_rest(tmp_path) -> None:
         "ground_angle": (pytest.approx(radians(30.0)),) * 2,
         "crank_length": (0.01, pytest.approx(0.08)),
     }
-    kinds = [type(c) for c in found.constraints]
-    assert kinds[:6] == [
-        syn.LeastTransmission,
-        syn.FullTurn,
-        syn.Grashof,
-        syn.LargestLink,
-        syn.Assembly,
-        syn.PivotRegion,
-    ]
+    kinds = [type(c).__name__ for c in found.constraints[:6]]
+    assert kinds == ["LeastTransmission", "FullTurn", "Grashof", "LargestLink", "Assembly", "PivotRegion"]
     assert (found.constraints[0].angle, found.constraints[0].over) == (pytest.approx(radians(35.0)), "task")
     np.testing.assert_allclose(found.constraints[5].polygon, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
     assert (found.make.density, found.make.speed) == (pytest.approx(2700.0), pytest.approx(4.0 * pi))
@@ -529,14 +521,8 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
     page = (ROOT / "docs" / "synthesis-cases.md").read_text()
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     syn.read_synthesis_case(tomllib.loads(block), folder=ROOT)
-    for kind in (
-        cases.SynthesisCase,
-        *KINDS.values(),
-        cases.Constraints,
-        cases.SearchTable,
-        cases.MachineSpec,
-        cases.TradeOffTable,
-    ):
+    tables = (cases.SynthesisCase, cases.Constraints, cases.SearchTable, cases.MachineSpec, cases.TradeOffTable)
+    for kind in (*KINDS.values(), *tables):
         for name in entry_names(kind):
             assert re.search(rf"\b{name}\b", page), name
 

@@ -59,16 +59,10 @@ def by_ecco(archive: str, stop_time: float, tolerance: float, bond: list[str], n
     from ssp_archive import unpack
 
     content = unpack(archive)
-    steps = {
-        "step_size": 1e-5,
-        "min_step_size": 1e-6,
-        "max_step_size": 1e-2,
-        "min_change_rate": 0.2,
-        "max_change_rate": 1.5,
-    }
-    algorithm = CosimAlgorithm.create_ecco_algorithm(
-        EccoParams(abs_tolerance=tolerance, rel_tolerance=tolerance, **steps)
-    )
+    steps = {"step_size": 1e-5, "min_step_size": 1e-6, "max_step_size": 1e-2}
+    rates = {"min_change_rate": 0.2, "max_change_rate": 1.5}
+    parameters = EccoParams(abs_tolerance=tolerance, rel_tolerance=tolerance, **steps, **rates)
+    algorithm = CosimAlgorithm.create_ecco_algorithm(parameters)
     execution = CosimExecution.from_algorithm(algorithm)
     slaves = {}
     for part, fmu in content.fmus.items():

@@ -14,17 +14,8 @@ from ..fmu.runner import run_in_process
 
 #: Length of the actuator (m) over time (s) in manoeuvre M1: F. Gonzalez, cosim-benchmarks,
 #: doc/data/hydraulicManipulator_ref.csv, one model in Cartesian coordinates at steps of 5e-5 s.
-PUBLISHED = {
-    2: 0.5,
-    3: 0.51736094,
-    4: 0.53918989,
-    5: 0.56539686,
-    6: 0.59603536,
-    7: 0.5809673,
-    8: 0.56266526,
-    9: 0.54106009,
-    10: 0.51536899,
-}
+LENGTHS = (0.5, 0.51736094, 0.53918989, 0.56539686, 0.59603536, 0.5809673, 0.56266526, 0.54106009, 0.51536899)
+PUBLISHED = dict(zip(range(2, 11), LENGTHS))
 
 
 def make(folder: str, here: str) -> str:

@@ -220,6 +220,14 @@ def entries_of(path: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
+def archived(path: Path, entries: dict[str, Any]) -> Path:
+    """Write an archive of bytes and texts by name; return its path."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    return path
+
+
 def values_of(wiring: Wiring) -> dict[str, dict[str, Any]]:
     return {name: dict(part.values) for name, part in wiring.parts.items()}
 
@@ -285,15 +293,12 @@ def test_start_values_in_other_units_are_converted_or_refused(tmp_path: Path) ->
     ):
         given = own.replace(f'value="{right}" unit="m"', f'value="{1e3 * right}" unit="{unit}"')
         entries["resources/linkage.ssv"] = text.replace(own, given).replace("</ssv:Units>", definition).encode()
-        with zipfile.ZipFile(tmp_path / "other.ssp", "w") as archive:
-            for name, content in entries.items():
-                archive.writestr(name, content)
+        other = archived(tmp_path / "other.ssp", entries)
         if fits:
-            values = read_ssp(tmp_path / "other.ssp").parts["linkage"].values
-            assert values["crank.length"] == pytest.approx(right, rel=1e-15)
+            assert read_ssp(other).parts["linkage"].values["crank.length"] == pytest.approx(right, rel=1e-15)
         else:
             with pytest.raises(WiringError, match=f"crank.length starts with .* {unit}: it must be in m"):
-                read_ssp(tmp_path / "other.ssp")
+                read_ssp(other)
 
 
 def test_a_part_that_nothing_is_connected_to_is_kept(tmp_path: Path) -> None:
@@ -357,53 +362,35 @@ def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
         (text.replace('<ssd:ParameterBinding source="resources/motor.ssv"/>',
                       bindings(("", parameters(rotor__mass='<ssv:Real value="NaN"/>'), ""))), "'NaN': it must be a number"),
     ):  # fmt: skip
-        with zipfile.ZipFile(tmp_path / "wrong.ssp", "w") as archive:
-            for name, content in entries.items():
-                if name != "SystemStructure.ssd":
-                    archive.writestr(name, content)
-                elif wrong:
-                    archive.writestr(name, wrong)
+        others = {name: content for name, content in entries.items() if name != "SystemStructure.ssd"}
         with pytest.raises(LinkworkError, match=message):
-            read_ssp(tmp_path / "wrong.ssp")
+            read_ssp(archived(tmp_path / "wrong.ssp", others | ({"SystemStructure.ssd": wrong} if wrong else {})))
     (tmp_path / "text.ssp").write_text("no archive")
     with pytest.raises(InputError, match=r"is no \.ssp"):
         read_ssp(tmp_path / "text.ssp")
 
 
 def test_start_values_of_the_whole_system_through_a_mapping(tmp_path: Path) -> None:
-    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
+    entries: dict[str, Any] = dict(entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp")))
     binding = (
         '<ssd:ParameterBindings><ssd:ParameterBinding source="resources/all.ssv"><ssd:ParameterMapping '
         'source="resources/all.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>'
     )
-    text = (
-        entries["SystemStructure.ssd"]
-        .decode()
-        .replace('<ssd:System name="system">', f'<ssd:System name="system">{binding}')
-    )
-    entries["SystemStructure.ssd"] = text.replace('<ssd:ParameterBinding source="resources/linkage.ssv"/>', "").encode()
-    common = 'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0"'
-    entries["resources/all.ssv"] = (
-        f'<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" {common} name="all">'
-        '<ssv:Parameters><ssv:Parameter name="damper"><ssv:Real value="7"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
-    ).encode()
-    entries["resources/all.ssm"] = (
-        f'<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" {common}>'
-        '<ssm:MappingEntry source="damper" target="linkage.slider.damping"/></ssm:ParameterMapping>'
-    ).encode()
-    with zipfile.ZipFile(tmp_path / "mapped.ssp", "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(name, content)
-    assert dict(read_ssp(tmp_path / "mapped.ssp").parts["linkage"].values) == {"slider.damping": 7.0}
+    text = entries["SystemStructure.ssd"].decode()
+    text = text.replace('<ssd:System name="system">', f'<ssd:System name="system">{binding}')
+    entries["SystemStructure.ssd"] = text.replace('<ssd:ParameterBinding source="resources/linkage.ssv"/>', "")
+    entries["resources/all.ssv"] = parameters(damper='<ssv:Real value="7"/>')
+    entries["resources/all.ssm"] = mapping(("damper", "linkage.slider.damping", ""))
+    mapped = read_ssp(archived(tmp_path / "mapped.ssp", entries))
+    assert dict(mapped.parts["linkage"].values) == {"slider.damping": 7.0}
 
 
-REVERSED = (
-    (
-        'startElement="motor" startConnector="shaft.exerted_torque"',
-        'startElement="linkage" startConnector="drive.torque"',
-    ),
-    ('endElement="linkage" endConnector="drive.torque"', 'endElement="motor" endConnector="shaft.exerted_torque"'),
-)
+#: A connection with its ends in the other order.
+MOTOR, LINKAGE = ("motor", "shaft.exerted_torque"), ("linkage", "drive.torque")
+REVERSED = [
+    (f'{side}Element="{old[0]}" {side}Connector="{old[1]}"', f'{side}Element="{new[0]}" {side}Connector="{new[1]}"')
+    for side, old, new in (("start", MOTOR, LINKAGE), ("end", LINKAGE, MOTOR))
+]
 
 
 def test_an_archive_of_another_tool_is_read_by_the_rules_of_the_standard(tmp_path: Path) -> None:
@@ -424,11 +411,8 @@ def test_an_archive_of_another_tool_is_read_by_the_rules_of_the_standard(tmp_pat
     own = parameters(d='<ssv:Float64 value="3"/>', mode='<ssv:Integer value="7"/>', rest='<ssv:Real value="9"/>')
     mapped = mapping(("my.d", "slider.mass", linear), ("my.mode", "drive.mode", table))
     linkage = bindings(("", first, ""), ("", later, ""), ('prefix="my."', own, mapped))
-    whole = parameters(
-        linkage__slider__stiffness='<ssv:Real value="500"/>',
-        nowhere__x='<ssv:Real value="5"/>',
-        push='<ssv:Real value="4"/>',
-    )
+    reals = {"linkage__slider__stiffness": 500, "nowhere__x": 5, "push": 4}
+    whole = parameters(**{name: f'<ssv:Real value="{value}"/>' for name, value in reals.items()})
     top = f"<ssd:ParameterBindings>{bindings(('', whole, ''))}</ssd:ParameterBindings>"
     edge = '<ssd:Connectors><ssd:Connector name="push" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>'
     inside = '<ssd:Connection startConnector="push" endElement="linkage" endConnector="slider.force"/>'
@@ -436,27 +420,16 @@ def test_an_archive_of_another_tool_is_read_by_the_rules_of_the_standard(tmp_pat
         *REVERSED,
         ('source="resources/motor.ssv"', 'source="extra/set.ssv" sourceBase="component"'),
         ('<ssd:ParameterBinding source="resources/linkage.ssv"/>', linkage),
-        (
-            '<ssd:System name="system">',
-            f'<ssd:System name="system">{edge}{top}',
-        ),
+        ('<ssd:System name="system">', f'<ssd:System name="system">{edge}{top}'),
         ("</ssd:Connections>", f"{inside}</ssd:Connections>"),
     ):
         assert old in text
         text = text.replace(old, new)
     entries["SystemStructure.ssd"] = text.encode()
-    with zipfile.ZipFile(tmp_path / "other.ssp", "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(name, content)
-    wiring = read_ssp(tmp_path / "other.ssp")
+    wiring = read_ssp(archived(tmp_path / "other.ssp", entries))
     assert wiring.connections == wiring_of("motor-crank").connections
-    values = {
-        "slider.damping": 2.0,
-        "slider.stiffness": 500.0,
-        "slider.mass": 7.0,
-        "drive.mode": 1.0,
-        "slider.force": 4.0,
-    }
+    slider = {"slider.damping": 2.0, "slider.stiffness": 500.0, "slider.mass": 7.0, "slider.force": 4.0}
+    values = slider | {"drive.mode": 1.0}
     assert values_of(wiring) == {"motor": {"shaft.damping": 0.25}, "linkage": values}
     assert [part.description.modelName for part in wiring.parts.values()] == ["InductionMotor", "FiveBarSlider"]
     left_out = [note for note in wiring.notes() if "left out" in note]
@@ -496,10 +469,7 @@ def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
         f"<ssd:ParameterBindings>{whole}</ssd:ParameterBindings>"
     )
     entries["SystemStructure.ssd"] = text.replace('<ssd:System name="system">', top).encode()
-    with zipfile.ZipFile(tmp_path / "nested.ssp", "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(name, content)
-    wiring, flat = read_ssp(tmp_path / "nested.ssp"), wiring_of("motor-crank")
+    wiring, flat = read_ssp(archived(tmp_path / "nested.ssp", entries)), wiring_of("motor-crank")
     assert {str(t).replace("machine_", ""): str(s).replace("machine_", "") for t, s in wiring.connections.items()} == {
         str(t): str(s) for t, s in flat.connections.items()
     }

@@ -13,8 +13,8 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, output_folder, print_error, print_paths, say, show_table, tolerance_option
-from .options import MechanismChoice, Problem, add_mechanism_options, out_option, problem_options
+from ..common import CHECK_FAILED, output_folder, print_error, print_paths, say, show_table, tolerance_option
+from .options import MechanismChoice, add_mechanism_options, out_option, problem_options
 
 
 @click.command(short_help="Compare the thesis's dual-number method with vector mechanics.")
@@ -23,7 +23,7 @@ from .options import MechanismChoice, Problem, add_mechanism_options, out_option
 @tolerance_option(default=1e-9, help="Largest relative difference that passes.")
 @click.option("--two-rotations", is_flag=True, help="Show instead the closure error of the thesis's own method.")
 @out_option
-def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
+def dual(chosen: MechanismChoice, tolerance: float, two_rotations: bool, out: str) -> None:
     """Compare the thesis's dual-number method with vector mechanics, quantity by quantity.
 
     Dual matrices with true ball joints (three rotations) close the loop, and dual momenta give the forces. Differences are
@@ -41,11 +41,11 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
         for name in ("torque", "load", "speed", "tolerance"):
             if source(name) is not ParameterSource.DEFAULT:
                 raise click.UsageError(f"--{name} has no effect with --two-rotations, which is about positions alone")
-        _show_two_rotations(chosen, problem.points, Path(out))
+        _show_two_rotations(chosen, chosen.points, Path(out))
         return
-    if chosen.groove == "shaft" and "torque" in problem.given:
+    if chosen.groove == "shaft" and "torque" in chosen.given:
         raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
-    found = sc.compare(problem.turn(chosen))
+    found = sc.compare(chosen.turn())
     units, passed = chosen.units, [d.relative <= tolerance for d in found.differences]
     show_table(
         f"{chosen.title}: dual numbers minus vector mechanics, {found.angles} crank angles",
@@ -61,7 +61,6 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
             )
             for d, ok in zip(found.differences, passed)
         ],
-        words=("quantity", "unit", "verdict"),
         styles=[None if ok else "red" for ok in passed],
     )
     say(
@@ -72,7 +71,7 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
     if not all(passed):
         print_error("check failed: the two do not agree", "red")
         sys.exit(CHECK_FAILED)
-    console.print("the two agree", style="green")
+    say("the two agree", style="green")
 
 
 def _show_two_rotations(chosen: MechanismChoice, points: int, folder: Path) -> None:

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ... import figures
 from ... import slider_crank as sc
-from ..common import output_folder, print_paths, say, show_table
+from ..common import output_folder, print_paths, save_plot, say, show_table
 from .options import (
     MechanismChoice,
-    Problem,
     Units,
     add_mechanism_options,
     angle_text,
@@ -40,7 +38,7 @@ if TYPE_CHECKING:
 )
 @out_option
 @plot_option
-def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
+def forces(chosen: MechanismChoice, frames: Sequence[int], out: str, plot: bool) -> None:
     """Find all joint forces over a turn, and the slider force if the torque is given, or the torque if the load is given.
 
     If the torque is given, the slider force is not finite at the dead centres. If the crank cannot make a full turn, all forces
@@ -53,25 +51,22 @@ def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out
       linkwork slider-crank forces --load '-20 lbf' --frame 2 --frame 4
       linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
     """
-    from ...files import save_figure, write_csv
+    from ...files import write_csv
 
     units, frames = chosen.units, tuple(dict.fromkeys(frames))
-    turn = problem.turn(chosen)
+    turn = chosen.turn()
     show_table(
         f"{chosen.title}: {turn.sought} sought",
         ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"),
         _extremes(turn, frames, units),
-        words=("quantity", "unit"),
     )
     for sentence in _special_places(turn, units):
         say(sentence)
     stem = str(output_folder(out) / f"{chosen.name}-forces")
     written = [write_csv(f"{stem}.csv", turn.columns(units.system))]
-    if plot:
-        for frame in frames:
-            title = f"{chosen.title}: joint forces in frame {frame}"
-            figure = figures.plot(turn, frame, units=units.system, title=title)
-            written.append(save_figure(figure, f"{stem}-frame-{frame}.png"))
+    for frame in frames:
+        title = f"{chosen.title}: joint forces in frame {frame}"
+        written += save_plot(plot, turn, f"{stem}-frame-{frame}.png", frame, units=units.system, title=title)
     print_paths(written)
 
 

@@ -10,7 +10,7 @@ import click
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_paths, quantity, say, show_table
+from ..common import console, print_paths, quantity, save_plot, say, show_table
 from .options import MechanismChoice, add_mechanism_options, angle_text, out_option
 
 
@@ -50,7 +50,7 @@ def info(chosen: MechanismChoice) -> None:
     found = sc.dead_centres(p, law)
     if not found:
         still = all(part.stroke <= 1e-12 * p.rod_length for part in parts)
-        console.print("no dead centres" + ": the slider stands still, whatever the crank angle" * still)
+        say("no dead centres" + ": the slider stands still, whatever the crank angle" * still)
         return
     length, scale = units.name("m"), units.factor("m")
     show_table(
@@ -65,7 +65,6 @@ def info(chosen: MechanismChoice) -> None:
             )
             for d in found
         ],
-        words=("which",),
     )
 
 
@@ -106,7 +105,7 @@ def picture(
     seen = common
     if view is not None:
         seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}
-    written = [save_figure(figures.plot(p, at, float(chosen.link_shift(at)), **seen), f"{stem}.png")]
+    written = save_plot(True, p, f"{stem}.png", at, float(chosen.link_shift(at)), **seen)
     if with_range:
         written.append(save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
     if animate:

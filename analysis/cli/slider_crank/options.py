@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import wraps
+from dataclasses import dataclass, field, replace
+from functools import reduce, wraps
 from math import degrees, tau
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,7 +78,8 @@ class MechanismChoice:
 
     ``name`` is the first part of the names of files that are written. ``shift`` (m) is the constant shift S1 of the crank; it
     has no effect if a groove moves the crank. ``groove`` is "shaft" for a groove in the crank shaft, "apart" for a drive apart
-    from the crank, None without a groove. ``speed`` is the crank speed (rad/s).
+    from the crank, None without a groove. ``speed`` is the crank speed (rad/s). For a force problem ``given`` has the torque
+    (N.m) or the load (N), and ``points`` is the number of crank angles.
     """
 
     name: str
@@ -88,6 +89,8 @@ class MechanismChoice:
     groove: str | None
     speed: float
     units: Units
+    given: Mapping[str, float] = field(default_factory=dict)
+    points: int = 0
 
     @property
     def law(self) -> PeriodicShift:
@@ -108,113 +111,7 @@ class MechanismChoice:
         """Return the shift (m) at crank angles (rad)."""
         return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _MechanismOptions:
-    """Options about the mechanism, as texts from the command line."""
-
-    file: str | None
-    published: str | None
-    offset: str | None
-    shift: str | None
-    twist: str | None
-    groove: str | None
-    settings: Sequence[str]
-    units: str
-    speed: str | None = None
-
-    def choose(self, *, paced: bool) -> MechanismChoice:
-        """Return the mechanism that the options choose; ``paced`` says whether the crank speed has an effect.
-
-        Raises LinkworkError if a file, a name or a value is wrong.
-        """
-        from ...files import unknown_name
-        from ...run import load_parameters, read_parameters
-
-        units = Units(self.units)
-        start, speed = 0.0, SETS[DEFAULT].crank_speed
-        name = self.published or DEFAULT
-        if self.file is not None:
-            if self.published is not None:
-                raise click.UsageError("give either a file of parameters or --published NAME")
-            check_kind(self.file, PARAMETERS)
-            loaded = load_parameters(self.file)
-            if not isinstance(loaded, SliderCrankParameters):
-                raise InputError(
-                    f'{self.file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
-                )
-            parameters, name = loaded, Path(self.file).stem
-            title = name
-        elif name in SETS:
-            case = SETS[name]
-            title, parameters = case.source, case.parameters
-            start, speed = case.initial.shift_position, case.crank_speed
-        else:
-            raise unknown_name(name, SETS, f"published case {name!r}")
-        values = changes(self.settings, number_or_text, "rod.length='45 in'")
-        for key, text in (("guide.offset", self.offset), ("guide.twist", self.twist)):
-            if text is not None:
-                values[key] = number_or_text(text)
-        if self.shift is not None:
-            if self.groove is not None:
-                raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
-            start = quantity(self.shift, "m", "--shift")
-        if self.speed is not None:
-            speed = quantity(self.speed, "rad/s", "--speed")
-        if values:
-            changed = read_parameters(values, parameters)
-            assert isinstance(changed, SliderCrankParameters)
-            parameters = changed
-        self._check_groove(parameters, values)
-        if self.file is not None:
-            self._note_defaults(parameters, units.length(start), speed if paced else None)
-        elif values or self.shift is not None or self.groove is not None:
-            name, title = "slider-crank", _title(units, parameters, start, self.groove)
-        return MechanismChoice(
-            name=name, title=title, parameters=parameters, shift=start, groove=self.groove, speed=speed, units=units
-        )
-
-    def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
-        """Raise a usage error if an option about a groove has no effect."""
-        if self.groove is None:
-            for name in values:
-                if name.startswith("groove."):
-                    raise click.UsageError(f"--set {name} has no effect without --groove shaft or --groove apart")
-        elif p.groove_amplitude == 0.0:
-            raise click.UsageError(
-                f"--groove {self.groove} with groove.amplitude = 0 makes no shift: give --set groove.amplitude='3 in', say, "
-                "or hold the crank with --shift"
-            )
-
-    def _note_defaults(self, p: SliderCrankParameters, start: str, speed: float | None) -> None:
-        """Print the default values of shift, groove and speed that are used because no option gives these quantities."""
-        used = []
-        if self.shift is None and self.groove is None:
-            used.append(f"S1 = {start} (--shift)")
-            if p.groove_amplitude != 0.0:
-                used.append("no groove (--groove)")
-        if speed is not None and self.speed is None:
-            used.append(f"a crank speed of {speed / RAD_S_PER_RPM:.6g} rpm (--speed)")
-        if used:
-            note(f"used by default, as nothing else is given: {', '.join(used)}")
-
-
-def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
-    """Return a title for tables and pictures with offset, shift or groove, and twist of a mechanism."""
-    moved = f"S1 = {units.length(shift)}"
-    if groove is not None:
-        moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
-    return f"Slider-crank: a4 = {units.length(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A force problem: the given ``torque`` (N.m) or ``load`` (N), and the number of crank angles."""
-
-    given: Mapping[str, float]
-    points: int
-
-    def turn(self, chosen: MechanismChoice, *, at: float | None = None) -> ForceTurn:
+    def turn(self, *, at: float | None = None) -> ForceTurn:
         """Solve the force problem at crank angles over a turn, and ``at`` one further crank angle (rad).
 
         Angles at which the mechanism cannot be assembled are left out, with a note.
@@ -223,17 +120,93 @@ class Problem:
         if at is not None and np.abs(angles - at).min() > 1e-9:
             angles = np.sort(np.append(angles, at))
         turn = sc.force_turn(
-            chosen.parameters,
-            crank_speed=chosen.speed,
-            shift=chosen.force_law,
-            angles=angles,
-            partial=True,
-            **self.given,
+            self.parameters, crank_speed=self.speed, shift=self.force_law, angles=angles, partial=True, **self.given
         )
         if len(turn.unreachable):
             missing = f"{len(turn.unreachable)} of {len(angles)} crank angles"
             note(f"the rod does not reach the guide at {missing}, which are left out")
         return turn
+
+
+def _choose(
+    units: Units,
+    *,
+    file: str | None,
+    published: str | None,
+    offset: str | None,
+    shift: str | None,
+    twist: str | None,
+    groove: str | None,
+    settings: Sequence[str],
+    speed: str | None,
+    paced: bool,
+) -> MechanismChoice:
+    """Return the mechanism that the options choose; ``paced`` says whether the crank speed has an effect.
+
+    Raises LinkworkError if a file, a name or a value is wrong.
+    """
+    from ...files import unknown_name
+    from ...run import load_parameters, read_parameters
+
+    name = published or DEFAULT
+    if file is not None:
+        if published is not None:
+            raise click.UsageError("give either a file of parameters or --published NAME")
+        check_kind(file, PARAMETERS)
+        parameters = load_parameters(file)
+        if not isinstance(parameters, SliderCrankParameters):
+            raise InputError(
+                f'{file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
+            )
+        name = title = Path(file).stem
+        start, pace = 0.0, SETS[DEFAULT].crank_speed
+    elif name in SETS:
+        case = SETS[name]
+        title, parameters = case.source, case.parameters
+        start, pace = case.initial.shift_position, case.crank_speed
+    else:
+        raise unknown_name(name, SETS, f"published case {name!r}")
+    values = changes(settings, number_or_text, "rod.length='45 in'")
+    for key, text in (("guide.offset", offset), ("guide.twist", twist)):
+        if text is not None:
+            values[key] = number_or_text(text)
+    if shift is not None:
+        if groove is not None:
+            raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
+        start = quantity(shift, "m", "--shift")
+    if speed is not None:
+        pace = quantity(speed, "rad/s", "--speed")
+    if values:
+        parameters = read_parameters(values, parameters)
+        assert isinstance(parameters, SliderCrankParameters)
+    for key in values if groove is None else ():
+        if key.startswith("groove."):
+            raise click.UsageError(f"--set {key} has no effect without --groove shaft or --groove apart")
+    if groove is not None and parameters.groove_amplitude == 0.0:
+        raise click.UsageError(
+            f"--groove {groove} with groove.amplitude = 0 makes no shift: give --set groove.amplitude='3 in', say, "
+            "or hold the crank with --shift"
+        )
+    if file is not None:
+        held = shift is None and groove is None
+        used = [f"S1 = {units.length(start)} (--shift)"] if held else []
+        used += ["no groove (--groove)"] if held and parameters.groove_amplitude != 0.0 else []
+        used += [f"a crank speed of {pace / RAD_S_PER_RPM:.6g} rpm (--speed)"] if paced and speed is None else []
+        if used:
+            note(f"used by default, as nothing else is given: {', '.join(used)}")
+    elif values or shift is not None or groove is not None:
+        name, title = "slider-crank", _title(units, parameters, start, groove)
+    return MechanismChoice(
+        name=name, title=title, parameters=parameters, shift=start, groove=groove, speed=pace, units=units
+    )
+
+
+def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
+    """Return a title for tables and pictures with offset, shift or groove, and twist of a mechanism."""
+    moved = f"S1 = {units.length(shift)}"
+    if groove is not None:
+        moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
+    return f"Slider-crank: a4 = {units.length(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
 
 
 _MECHANISM_OPTIONS = (
@@ -269,12 +242,15 @@ def add_mechanism_options(command: Command) -> Command:
     @wraps(command)
     @report_errors
     def run(**options: Any) -> Any:
-        own = {field.name: options.pop(field.name) for field in fields(_MechanismOptions) if field.name in options}
-        paced = "torque" in options and not options.get("two_rotations")
+        names = ("file", "published", "offset", "shift", "twist", "groove", "settings", "speed")
+        own, units = {name: options.pop(name, None) for name in names}, Units(options.pop("units"))
+        forces = "torque" in options
         try:
-            return command(chosen=_MechanismOptions(**own).choose(paced=paced), **options)
+            given = _given(options.pop("torque"), options.pop("load")) if forces else {}
+            chosen = _choose(units, **own, paced=forces and not options.get("two_rotations"))
+            return command(chosen=replace(chosen, given=given, points=options.pop("points", 0)), **options)
         except LinkworkError as error:
-            raise LinkworkError(Units(own["units"]).convert_error(str(error))) from error
+            raise LinkworkError(units.convert_error(str(error))) from error
 
     for option in reversed(_MECHANISM_OPTIONS):
         run = option(run)
@@ -284,37 +260,27 @@ def add_mechanism_options(command: Command) -> Command:
 def problem_options(points: int) -> Callable[[Command], Command]:
     """Return a decorator that adds the options of a force problem: --torque, --load, --points and --speed.
 
-    The command receives the first three as one `Problem`, its argument ``problem``. ``points`` is the default of --points.
+    `add_mechanism_options`, which must come above it, puts their values into the `MechanismChoice`. ``points`` is the default
+    of --points.
     """
+    options = (
+        speed_option,
+        click.option(
+            "--torque", metavar="TORQUE", help="Torque on the crank, such as '100 lbf*in'; the slider force is sought."
+        ),
+        click.option("--load", metavar="FORCE", help="Load on the slider; the crank torque is sought. 0 by default."),
+        click.option("--points", type=click.IntRange(2), default=points, help="Number of crank angles over the turn."),
+    )
+    return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
 
-    def decorate(command: Command) -> Command:
-        @wraps(command)
-        def run(*, torque: str | None, load: str | None, points: int, **options: Any) -> Any:
-            if torque is not None and load is not None:
-                raise click.UsageError("give either --torque, to find the slider force, or --load, to find the torque")
-            given = {"load": quantity("0" if load is None else load, "N", "--load")}
-            if torque is not None:
-                given = {"torque": quantity(torque, "N.m", "--torque")}
-            return command(problem=Problem(given, points), **options)
 
-        for option in (
-            click.option(
-                "--points", type=click.IntRange(2), default=points, help="Number of crank angles over the turn."
-            ),
-            click.option(
-                "--load", metavar="FORCE", help="Load on the slider; the crank torque is sought. 0 by default."
-            ),
-            click.option(
-                "--torque",
-                metavar="TORQUE",
-                help="Torque on the crank, such as '100 lbf*in'; the slider force is sought.",
-            ),
-            speed_option,
-        ):
-            run = option(run)
-        return run
-
-    return decorate
+def _given(torque: str | None, load: str | None) -> dict[str, float]:
+    """Return the torque (N.m) or the load (N) that the options of a force problem give."""
+    if torque is not None and load is not None:
+        raise click.UsageError("give either --torque, to find the slider force, or --load, to find the torque")
+    if torque is not None:
+        return {"torque": quantity(torque, "N.m", "--torque")}
+    return {"load": quantity("0" if load is None else load, "N", "--load")}
 
 
 def note(text: str) -> None:

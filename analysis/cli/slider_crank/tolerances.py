@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, tau
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from linkwork.errors import InputError
 
-from ... import figures
 from ... import slider_crank as sc
-from ..common import console, output_folder, print_paths, quantity, show_table, workers_options
+from ..common import console, output_folder, print_paths, quantity, save_plot, show_table, workers_options
 from .options import (
     MechanismChoice,
-    Problem,
     Units,
     add_mechanism_options,
     note,
@@ -31,14 +29,6 @@ if TYPE_CHECKING:
 #: Quantities that have a tolerance by default, and the default half widths by unit.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
-
-
-class Sampling(TypedDict):
-    """Options of the Monte Carlo simulation: number of samples, seed, number of processes."""
-
-    samples: int
-    seed: int
-    jobs: int | None
 
 
 @click.command(short_help="Report the effect of manufacturing tolerances.")
@@ -74,14 +64,15 @@ class Sampling(TypedDict):
 @plot_option
 def tolerances(
     chosen: MechanismChoice,
-    problem: Problem,
     widths: Sequence[str],
     distribution: str,
     quantities: Sequence[str],
     angle: str,
     out: str,
     plot: bool,
-    **sampling: Unpack[Sampling],
+    samples: int,
+    seed: int,
+    jobs: int | None,
 ) -> None:
     """Report the effect of manufacturing tolerances: exact sensitivities, a linear estimate, and a Monte Carlo simulation.
 
@@ -91,13 +82,13 @@ def tolerances(
       linkwork slider-crank tolerances --tolerance guide.offset='0.5 mm' --tolerance guide.twist='0.2 deg'
       linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
     """
-    from ...files import save_figure, write_csv
+    from ...files import write_csv
 
     at = _reduce_to_turn(quantity(angle, "rad", "--angle"), chosen)
     units, quantities = chosen.units, tuple(dict.fromkeys(quantities))
     defaults = [f"{name}={_WIDTHS[sc.ERRORS[name]]}" for name in _TOLERANCES]
     allowed = [_tolerance(text, distribution) for text in widths or defaults]
-    turn = problem.turn(chosen, at=at)
+    turn = chosen.turn(at=at)
     exact = sc.sensitivities(turn, tuple(t.name for t in allowed), quantities)
     for name in quantities:
         if np.ma.getmaskarray(exact.values[name]).all():
@@ -111,8 +102,7 @@ def tolerances(
         )
     rows, slopes = _sensitivity_table(exact, allowed, place, units)
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
-    show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
-    samples, seed, jobs = sampling["samples"], sampling["seed"], sampling["jobs"]
+    show_table(f"{chosen.title}: sensitivities", headings, rows)
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed, n_jobs=jobs)
     stem = str(output_folder(out) / chosen.name)
@@ -121,12 +111,9 @@ def tolerances(
     _show_spread(found, place, f"{chosen.title}: spread at {here}, {samples} samples", units)
     for message in found.notes(units.system):
         note(message)
-    if plot:
-        for name in quantities:
-            figure = figures.plot(
-                found, name, at, units=units.system, title=f"{chosen.title}: {name.replace('.', ' ')}"
-            )
-            files.append(save_figure(figure, f"{stem}-tolerances-{name}.png"))
+    for name in quantities:
+        title = f"{chosen.title}: {name.replace('.', ' ')}"
+        files += save_plot(plot, found, f"{stem}-tolerances-{name}.png", name, at, units=units.system, title=title)
     print_paths(files)
 
 
@@ -234,4 +221,4 @@ def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> Non
         )
         rows.append((name, units.name(si), *(_number(x[place] * units.factor(si), digits) for x, digits in values)))
     headings = "quantity", "unit", "nominal", "sd, linear", "sd, 2nd order", "sd, samples", "worst, linear", "mean off"
-    show_table(title, headings, rows, words=("quantity", "unit"))
+    show_table(title, headings, rows)
