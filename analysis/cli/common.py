@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import wraps
 from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 from rich.console import Console
@@ -70,6 +70,17 @@ def print_error(text: str, style: str = "yellow") -> None:
     errors.print(escape_controls(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
+def note(text: str) -> None:
+    """Print a note on standard error."""
+    print_error(f"note: {text}")
+
+
+def fail(text: str, code: int) -> NoReturn:
+    """Print an error and exit with a code."""
+    print_error(text, "red")
+    sys.exit(code)
+
+
 def print_paths(paths: Iterable[Path]) -> None:
     """Print the names of the files that were written."""
     for path in paths:
@@ -93,8 +104,8 @@ def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
             try:
                 return report(*arguments, **options)
             finally:
-                for note in writing.notes:
-                    print_error(f"note: {note}")
+                for line in writing.notes:
+                    note(line)
 
     def report(*arguments: Any, **options: Any) -> Any:
         try:
@@ -108,8 +119,7 @@ def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
             text = f"{error.filename or 'a file'}: {error.strerror or error}"
         except MemoryError as error:
             text = f"not enough memory: {error or 'ask for less at a time'}"
-        print_error(f"error: {text}", "red")
-        sys.exit(WRONG)
+        fail(f"error: {text}", WRONG)
 
     return run
 
@@ -408,7 +418,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     else:
         case = published_case(str(published))
     for warning in describe_masses(case.masses)[1]:
-        print_error(f"note: {warning}")
+        note(warning)
     return case
 
 

@@ -253,14 +253,14 @@ def synthesize(
     written += common.save_plot(plot, result, folder / "alternatives.png", title=chosen.title)
     common.print_paths(written)
     for note in filter(None, (best.poor, format_short(best.solution))):
-        common.print_error(f"note: {note}")
+        common.note(note)
     if crowded := crowded_plates(result.best, chosen.make.hole):
-        common.print_error(
-            f"note: in the plates, holes of {1e3 * chosen.make.hole:g} mm overlap in {' and '.join(crowded)}: smaller make.pin "
+        common.note(
+            f"in the plates, holes of {1e3 * chosen.make.hole:g} mm overlap in {' and '.join(crowded)}: smaller make.pin "
             "and make.width, or longer links"
         )
     if not result.best.verdicts.sound:
-        common.print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
+        common.note(f"none of them is free of defects: the first has {result.best.verdicts}")
     leave_if_stopped(stopped, "the best so far is kept")
     try:
         traded = chosen.trade(progress=common.console.is_terminal)
@@ -277,7 +277,7 @@ def _trade_off(traded: TradeOff, title: str, folder: Path, plot: bool) -> list[P
     task = next((s.task for s in traded.solutions if s is not None), None)
     what = OVER[traded.over].name
     if task is None:
-        common.print_error(f"note: no linkage keeps any of the limits of the {what}")
+        common.note(f"no linkage keeps any of the limits of the {what}")
         return []
     headings = ("limit", *quality_headings(task)[::2])
     rows = [

@@ -42,7 +42,7 @@ class CaseChoice:
         speed = speed or self.speed
         value = None if speed is None else common.quantity(speed, "rad/s", "--speed")
         if value is not None and self.case.inputs.torque is not None:
-            common.print_error("note: the speed is prescribed; the case's torque is left out")
+            common.note("the speed is prescribed; the case's torque is left out")
         try:
             drive = steady_drive(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
             # raises an error if no degree of freedom is free
@@ -85,7 +85,7 @@ class CaseChoice:
         """Print written files and problems; exit with an error code if there are problems or the command was interrupted."""
         common.print_paths(written)
         for problem in problems:
-            common.print_error(f"note: {problem}")
+            common.note(problem)
         if interrupted or problems:
             sys.exit(common.INTERRUPTED if interrupted else common.ENDED_EARLY)
 

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 
 import click
-import numpy as np
 
 from linkwork.errors import InputError
 
@@ -20,11 +19,10 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
 @click.option(
     "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
-@click.option("--count", type=click.IntRange(1), help="Number of linkages to report for four poses, 6 by default.")
 @common.plot_option
 @common.out_option(help="Folder for the results.")
 @common.report_errors
-def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int | None, plot: bool, out: str) -> None:
+def exact(case: str, settings: Sequence[str], crank_phase: str | None, plot: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
     For five poses of a body there are up to six four-bars; for four poses there is a curve of dyads (Burmester). For three to
@@ -62,22 +60,20 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     if isinstance(task, QuickReturn | QuickSwing) or not isinstance(task, RockerFunction | PrecisionPoints | Motion):
         which = f"{case} asks for a {type(task).__name__}, not for points of a rocker function or poses of a body"
         raise InputError(f"{which}: linkwork synthesize {case}")
-    if count is not None and (isinstance(task, RockerFunction) or len(np.asarray(task.points)) != 4):
-        raise InputError("--count is for four poses of a body: all other linkages are reported")
     if isinstance(task, RockerFunction):
         found = function_generators(task, crank_phase=crank_phase)
     elif crank_phase is not None:
         raise InputError("--crank-phase is for a function of the rocker: poses leave the crank's angle free")
     else:
-        found = guidance(task, count or 6)
+        found = guidance(task)
     common.say(f"{chosen.title}: {found.describe()}")
     folder = common.output_folder(out)
     written = []
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)
         if any(quality_cells(s)[-1] != "0" for s in found.solutions):
-            common.print_error(
-                "note: each linkage meets all targets, but one with a branch or circuit defect needs both assemblies for them; "
+            common.note(
+                "each linkage meets all targets, but one with a branch or circuit defect needs both assemblies for them; "
                 "its errors are those in the assembly of the first target"
             )
         best = found.solutions[0]
@@ -95,5 +91,5 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         written += common.save_plot(plot, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
     common.print_paths(written)
     if not any(s.verdicts.sound for s in found.solutions):
-        common.print_error(f"note: {found.describe()}")
+        common.note(found.describe())
         sys.exit(common.ENDED_EARLY)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_place, console, print_error, report_errors, say
+from .common import check_place, console, note, report_errors, say
 
 if TYPE_CHECKING:
     from linkwork.mechanism import Mechanism
@@ -78,8 +78,8 @@ def build(
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
     for name, mechanism in described.items():
         if entries := _entries_of_runs(name, mechanism):
-            print_error(
-                f"note: {mechanism.fmu} starts with the values in [linkage] of {name}; {', '.join(entries)} outside of this "
+            note(
+                f"{mechanism.fmu} starts with the values in [linkage] of {name}; {', '.join(entries)} outside of this "
                 f"table {'is' if len(entries) == 1 else 'are'} only for runs of the file. Set such values in the master, or in "
                 "[linkage]: start and speed of each freedom"
             )

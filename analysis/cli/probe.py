@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -105,8 +104,7 @@ def probe(
     failing = SEVERITIES if strict else (CRASH, WRONG)
     failed = [finding for finding in findings if finding.severity in failing]
     if failed:
-        common.print_error(f"probe failed: {len(failed)} findings", "red")
-        sys.exit(common.CHECK_FAILED)
+        common.fail(f"probe failed: {len(failed)} findings", common.CHECK_FAILED)
     common.say("no finding" if not findings else f"{len(findings)} questionable findings, nothing wrong")
 
 

@@ -98,8 +98,8 @@ def run(
     common.say(describe_masses(chosen.masses)[0])
     common.print_paths(written)
     if fmu is not None and interface in (None, "co-simulation") and not chosen.inputs.held_exactly:
-        common.print_error(
-            f"note: inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
+        common.note(
+            f"inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
             "a run in process lets them act continuously. Shorten --step until the result no longer changes."
         )
     if interrupted:
@@ -111,7 +111,7 @@ def run(
             common.print_error(sentence)
         sys.exit(common.ENDED_EARLY)
     if result.message:
-        common.print_error(f"note: {result.message}")
+        common.note(result.message)
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
@@ -272,8 +272,7 @@ def check(
             common.show_table(f"{case.title}, tolerance {tolerance:g}", headings, lines, styles=styles)
         count += len(runs)
     if failed:
-        common.print_error(f"check failed: {', '.join(failed)}", "red")
-        sys.exit(common.CHECK_FAILED)
+        common.fail(f"check failed: {', '.join(failed)}", common.CHECK_FAILED)
     common.say(f"{count} of {count} checks pass", style="green")
 
 

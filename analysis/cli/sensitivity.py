@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwork.errors import LinkworkError
 
-from .common import print_error, say, show_table
+from .common import note, say, show_table
 from .driven import swing_unit
 
 #: Greatest number of parameters that are printed for each point.
@@ -49,7 +49,7 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
         try:
             found = special_gradient(family, point, names)
         except LinkworkError as error:
-            print_error(f"note: the {word} at {family.format_value(point.parameter)} has no gradient: {error}")
+            note(f"the {word} at {family.format_value(point.parameter)} has no gradient: {error}")
             continue
         place, amplitude = found.place, found.amplitude
         number = getattr(point, "coordinate", 0)

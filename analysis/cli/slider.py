@@ -71,9 +71,7 @@ def slider_motion(
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
-            common.print_error(
-                "note: no forces are computed for a five-bar with a geared second crank: run its linkage.toml"
-            )
+            common.note("no forces are computed for a five-bar with a geared second crank: run its linkage.toml")
         else:
             written += _dynamics(chosen, solution, folder, plot)
     elif isinstance(pivot, SliderMotion):
@@ -99,7 +97,7 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
     common.show_table(f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, styles=styles)
     if not found.met:
-        common.print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
+        common.note(f"none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
 
 
@@ -211,7 +209,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plot: bool) 
         ),
     ]
     if drive.slider.order > HARMONICS:
-        common.print_error(f"note: the reference in system.toml has the first {HARMONICS} harmonics of the motion only")
+        common.note(f"the reference in system.toml has the first {HARMONICS} harmonics of the motion only")
     written += common.save_plot(plot, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plot)
@@ -251,14 +249,14 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plot: bool) 
     assert chosen.tracking is not None
     period, design = chosen.tracking.period, chosen.design(drive)
     if design is not None and (growth := float(abs(design.sampled_poles(period)[-1]))) >= 1.0:
-        common.print_error(
-            f"note: sampled every {period:g} s, the feedback is unstable: errors grow by a factor of {growth:.3g} from "
+        common.note(
+            f"sampled every {period:g} s, the feedback is unstable: errors grow by a factor of {growth:.3g} from "
             "sample to sample; shorten tracking.period or lower tracking.bandwidth"
         )
     run = chosen.run_tracking(drive)
     loop = run.loop
     if loop.status:
-        common.print_error(f"note: the run under control ended early: {loop.message}")
+        common.note(f"the run under control ended early: {loop.message}")
     else:
         m = run.metrics()
         rows = [

@@ -82,9 +82,7 @@ def _open(address: str) -> None:
     """
     screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
     if not (screen and webbrowser.open(address)):
-        common.print_error(
-            "note: there is no browser here: open the address in one, or write the page as a file with --out"
-        )
+        common.note("there is no browser here: open the address in one, or write the page as a file with --out")
 
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:

@@ -146,7 +146,7 @@ def run(
     title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
     common.show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows)
     for note in found.notes:
-        common.print_error(f"note: {note}")
+        common.note(note)
     if found.powers:
         advice = found.suggested_step(1e-3)
         then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
@@ -195,13 +195,13 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
     for bond in bonds:
         common.say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
     for note in wiring.notes():
-        common.print_error(f"note: {note}")
+        common.note(note)
     if Path(file).suffix == ".ssp":
         return
     described = load_system(file)
     if foreign := [name for name, table in described.parts.items() if table.fmu]:
-        common.print_error(
-            f"note: the equations of {' and '.join(foreign)} are not known: the errors of the couplings are not measured"
+        common.note(
+            f"the equations of {' and '.join(foreign)} are not known: the errors of the couplings are not measured"
         )
         return
     found = convergence(
@@ -224,7 +224,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
         common.show_table("work that the coupling added, relative to the work through the power bonds [%]",
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
-        common.print_error(f"note: {when}: {message}")
+        common.note(f"{when}: {message}")
     common.print_paths(common.save_plot(plot, found, common.output_folder(out) / f"{Path(file).stem}-check.png"))
 
 

@@ -55,7 +55,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     if not as_json:
         common.print_paths(written)
     for sentence in tuned.missed:
-        common.print_error(f"note: {sentence}")
+        common.note(sentence)
     if not tuned.met:
         sys.exit(common.CHECK_FAILED)
 

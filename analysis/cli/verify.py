@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
-from .common import CHECK_FAILED, console, print_error, report_errors, say, show_table, tolerance_option
+from .common import CHECK_FAILED, console, fail, note, print_error, report_errors, say, show_table, tolerance_option
 
 
 @click.command()
@@ -59,10 +57,9 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
         if outcome.message:
             print_error(f"{outcome.experiment}: {outcome.message}", "red")
     if failed:
-        print_error(f"verify failed: {', '.join(outcome.experiment for outcome in failed)}", "red")
-        sys.exit(CHECK_FAILED)
+        fail(f"verify failed: {', '.join(outcome.experiment for outcome in failed)}", CHECK_FAILED)
     if alone := [outcome.experiment for outcome in outcomes if not outcome.deviations]:
-        print_error(f"note: without reference results, so that nothing was compared: {', '.join(alone)}")
+        note(f"without reference results, so that nothing was compared: {', '.join(alone)}")
     say(f"{len(outcomes)} of {len(outcomes)} experiments pass", style="green")
 
 
@@ -76,8 +73,8 @@ def _rebuild(fmu: str) -> None:
     styles = [None if part.same else "red" for part in parts]
     show_table(fmu, ("part", "compared with", "verdict"), rows, styles=styles)
     if not all(part.same for part in parts):
-        print_error(
-            "rebuild failed: the FMU differs from a build from its sources with the programs installed here", "red"
+        fail(
+            "rebuild failed: the FMU differs from a build from its sources with the programs installed here",
+            CHECK_FAILED,
         )
-        sys.exit(CHECK_FAILED)
     say("the FMU is the same as a build from its sources", style="green")

@@ -486,8 +486,8 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begi
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
     common.say("\n".join(lines))
     if friction:
-        common.print_error(
-            "note: Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
+        common.note(
+            "Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
             "and its multipliers are those of the creep"
         )
     return orbit
@@ -508,8 +508,8 @@ def _note_other_motion(found: Any, reached: Any) -> None:
         return
     if charted.distance(reached.start) > _SAME_MOTION:
         _, size, unit = swing_unit(charted)
-        common.print_error(
-            f"note: at its operating point the chart follows a motion of amplitude {size * charted.amplitude:.5g} {unit}, not "
+        common.note(
+            f"at its operating point the chart follows a motion of amplitude {size * charted.amplitude:.5g} {unit}, not "
             f"the motion of {size * reached.amplitude:.5g} {unit} that the machine reaches: --coexisting shows all motions"
         )
 

@@ -236,13 +236,12 @@ def catalogue(walk: Walk) -> list[Fault]:
 
 @dataclass(frozen=True, slots=True)
 class BadStart:
-    """A forbidden or unusual instantiation: with a changed argument, or by another function."""
+    """A forbidden or unusual instantiation, with a changed argument."""
 
     what: str  # what is wrong or unusual
     accepted: str | None  # severity of the finding if the FMU makes an instance, or `ACCEPT`
     position: int  # position of the changed argument
     value: Any  # value of the changed argument
-    function: str | None = None  # another function, if not the usual one
 
     @property
     def key(self) -> str:
@@ -267,9 +266,9 @@ def bad_starts(model: Model) -> list[BadStart]:
             BadStart("unknown type", WRONG, 1, 99),
             *([] if model.other_interface else [BadStart("an interface that it does not have", WRONG, 1, other)]),
         ]
-    elif model.interface == "cs":
-        starts += [] if model.event_mode else [BadStart("event mode that it does not have", WRONG, 5, True)]
-        starts += [BadStart("NULL logger", ACCEPT, 10, fmi3.fmi3LogMessageCallback())]
     else:
-        starts += [BadStart("NULL logger", ACCEPT, 6, fmi3.fmi3LogMessageCallback())]
+        stepped = model.interface == "cs"
+        if stepped and not model.event_mode:
+            starts.append(BadStart("event mode that it does not have", WRONG, 5, True))
+        starts.append(BadStart("NULL logger", ACCEPT, 10 if stepped else 6, fmi3.fmi3LogMessageCallback()))
     return starts

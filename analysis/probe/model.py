@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from linkwork.errors import InputError
-
 #: Group of functions and C type for each type of variable, in FMI 2 and FMI 3; the group Real has GetReal and SetReal.
 TYPES: dict[int, dict[str, tuple[str, Any]]] = {
     2: {
@@ -129,16 +127,12 @@ def interfaces(description: Any) -> list[str]:
 
 
 def read_model(folder: Path, interface: str) -> Model:
-    """Read one interface, cs or me, of an extracted FMU."""
+    """Read one interface, cs or me, that an extracted FMU of FMI 2.0 or 3.0 has."""
     from fmpy import read_model_description
 
     description = read_model_description(str(folder), validate=False)
     version = description.fmiMajorVersion
-    if version not in TYPES:
-        raise InputError(f"the FMU is of FMI {description.fmiVersion}: the probe is for 2.0 and 3.0")
     about = description.coSimulation if interface == "cs" else description.modelExchange
-    if about is None:
-        raise InputError(f"the FMU has no interface {interface!r}: it has {', '.join(interfaces(description))}")
     experiment = description.defaultExperiment
     start, stop, step = (
         _number(getattr(experiment, name, None), 0.0) for name in ("startTime", "stopTime", "stepSize")

@@ -200,7 +200,7 @@ class ForceTurn:
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
         """Return the dead centres of the slider between the first and the last angle, exact to rounding errors."""
-        return self._course.dead_centres(*self._span)
+        return self._course.zeros(*self._span, held=False)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
@@ -209,7 +209,7 @@ class ForceTurn:
         There ``ratio`` is zero. These configurations are the dead centres, unless the shift moves without a groove in the
         shaft.
         """
-        return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
+        return self._course.zeros(*self._span, held=not has_shaft_groove(self.law))
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
@@ -268,8 +268,7 @@ class ForceTurn:
         reach = low - away, high + away
         places = list(self._course.limits(*reach))
         if poles and self.sought == SLIDER_FORCE:
-            find = self._course.dead_centres if has_shaft_groove(self.law) else self._course.singularities
-            places += [c.crank_angle for c in find(*reach)]
+            places += [c.crank_angle for c in self._course.zeros(*reach, held=not has_shaft_groove(self.law))]
         distances = np.abs(self.angle[:, None] - np.array(places)[None, :])
         return np.asarray((distances > away).all(axis=1))
 

@@ -176,11 +176,6 @@ class Range(NamedTuple):
         return self.greatest.slider_position - self.least.slider_position
 
 
-class _Zero(NamedTuple):
-    angle: float
-    falling: bool
-
-
 class _Change(NamedTuple):
     """D, A, B of the module docstring (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes.
 
@@ -232,16 +227,6 @@ def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch:
 _Bounded = Callable[[float, float], tuple[float, float]]
 
 
-def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
-    """Return the function A: it is zero where the distance between crank pin and guide is extreme."""
-
-    def slope(middle: float, half: float) -> tuple[float, float]:
-        change = _change(middle, half, law, p, 1.0)
-        return change.pull, change.pull_spread
-
-    return slope
-
-
 def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
     """Return the function A - B h (A + B h on branch -1): its sign is that of S4' on branch +1, the opposite on branch -1."""
 
@@ -274,8 +259,8 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
             high = middle
 
 
-def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
-    """Find all sign changes of ``function`` between ``low`` and ``high``, in order.
+def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[tuple[float, bool]]:
+    """Find all sign changes of ``function`` between ``low`` and ``high``, in order: the angle, and whether the function falls.
 
     A stretch over which the function is zero, up to rounding errors of ``scale``, counts as one zero if the signs before and
     after the stretch differ; otherwise it does not count.
@@ -301,13 +286,13 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
     for a, b in pairwise([low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]):
         search(a, b)
     # look for sign changes only in the pieces that were kept
-    found: list[_Zero] = []
+    found: list[tuple[float, bool]] = []
     last: float | None = None
     for x in kept:
         if abs(function(x, 0.0)[0]) <= floor:
             continue
         if last is not None and positive(x) != positive(last):
-            found.append(_Zero(_bisect(positive, last, x), positive(last)))
+            found.append((_bisect(positive, last, x), positive(last)))
         last = x
     return found
 
@@ -326,8 +311,14 @@ def _assembly_square(angle: float, law: PeriodicShift, p: Constants) -> float:
 
 def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
     """Find the angles of local extremes of the margin of assembly, in order; one angle if the margin is the same everywhere."""
-    zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
-    return [zero.angle for zero in zeros] or [0.0]
+
+    def slope(middle: float, half: float) -> tuple[float, float]:
+        """Return the function A: it is zero where the distance between crank pin and guide is extreme."""
+        change = _change(middle, half, law, p, 1.0)
+        return change.pull, change.pull_spread
+
+    zeros = _zeros(slope, _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
+    return [angle for angle, _ in zeros] or [0.0]
 
 
 @takes_published()
@@ -383,7 +374,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     least = 0.0
     if room > _EQUAL * p.a2:
         zeros = _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
-        least = min(bound(zero.angle) for zero in zeros)
+        least = min(bound(angle) for angle, _ in zeros)
     # the sine of a twist of pi is a rounding error
     parallel = abs(p.sa) <= 4.0 * float_info.epsilon * max(1.0, abs(parameters.guide_twist))
     return inf if parallel else least / abs(p.sa)
@@ -400,7 +391,7 @@ def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = Fals
 def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
     slope = _slider_slope(lambda middle, half: _change(middle, half, law, p, pitch), p.branch)
     zeros = _zeros(slope, low, high, (p.a1 + law.rate) * p.a2)
-    return tuple(sorted(DeadCentre(*_place(zero.angle, law, p), outer=zero.falling) for zero in zeros))
+    return tuple(sorted(DeadCentre(*_place(angle, law, p), outer=falling) for angle, falling in zeros))
 
 
 def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:

@@ -179,14 +179,6 @@ class Course:
     parameters: SliderCrankParameters
     law: ShiftLaw
 
-    def dead_centres(self, low: float, high: float) -> tuple[DeadCentre, ...]:
-        """Find the configurations from ``low`` to ``high`` (rad) in which the slider reverses."""
-        return self._zeros(low, high, held=False)
-
-    def singularities(self, low: float, high: float) -> tuple[DeadCentre, ...]:
-        """Find the configurations from ``low`` to ``high`` (rad) in which the slider would reverse at constant shift."""
-        return self._zeros(low, high, held=True)
-
     def limits(self, low: float, high: float) -> tuple[float, ...]:
         """Find the crank angles from ``low`` to ``high`` (rad) at which a range of assembly ends."""
         repeating = self.law.periodic_shift(self.parameters)
@@ -203,8 +195,8 @@ class Course:
         moved = (end + more for more in _whole_spans(low, high, repeating.span) for end in ends)
         return tuple(sorted(end for end in moved if low <= end <= high))
 
-    def _zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
-        """Find the zeros of the slider's velocity along the law, or with the shift held constant if ``held``."""
+    def zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider reverses (at a ``held`` shift)."""
         repeating = self.law.periodic_shift(self.parameters)
         if repeating is None:
             return self._sign_changes(low, high, 0.0 if held else 1.0)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..files import unknown_name
 from ..run import show_progress
 from .description import System
 from .joined import JoinedSystem
@@ -83,7 +82,6 @@ def convergence(
     *,
     decades: int = 2,
     stop_time: float | None = None,
-    ways: Sequence[str] = tuple(WAYS),
     progress: bool = False,
 ) -> Convergence:
     """Run a system with several couplings and communication steps, and compare each run with that of a `JoinedSystem`.
@@ -98,22 +96,15 @@ def convergence(
         Number of decades of the default steps.
     stop_time : float, optional
         End of the runs (s); by default 50 times the first step, or the system's stop time if that is earlier.
-    ways : sequence of str
-        Ways of coupling, keys of `WAYS`.
     progress : bool
 
     Raises
     ------
     InputError
         If a step does not divide the first step, or the first step the stop time.
-    UnknownNameError
-        If a way is not one of `WAYS`.
     WiringError
         If a part is an FMU, whose equations are not known.
     """
-    for way in ways:
-        if way not in WAYS:
-            raise unknown_name(way, WAYS, f"coupling {way!r}")
     if steps is None:
         periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
         first = min([system.run.step, *periods, system.run.stop_time])
@@ -125,18 +116,19 @@ def convergence(
                 f"a step of {part:g} s does not divide {whole:g} s: it must, so that the runs have common points"
             )
     right = JoinedSystem(system).run(stop_time, steps[0])
-    wirings = {way: (system if WAYS[way].rates else system.without_rates()).wiring(fmi=WAYS[way].fmi) for way in ways}
+    wirings = {
+        name: (system if way.rates else system.without_rates()).wiring(fmi=way.fmi) for name, way in WAYS.items()
+    }
     # accelerations jump where a controller takes a sample
     ports = next(iter(wirings.values()))
     sources = dict.fromkeys(system.connections.values())
     names = [str(s) for s in sources if not ports.port(s).unit.endswith("/s2") and str(s) in right.values]
-    errors = {way: np.full(len(steps), np.nan) for way in ways}
-    powers = {way: np.full(len(steps), np.nan) for way in ways}
+    errors, powers = ({way: np.full(len(steps), np.nan) for way in WAYS} for _ in range(2))
     messages = {}
-    whole = len(ways) * sum(1.0 / step for step in steps)
+    whole = len(WAYS) * sum(1.0 / step for step in steps)
     with show_progress(progress, whole, "couplings and steps") as show:
         done = 0.0
-        for way in ways:
+        for way in WAYS:
             for number, step in enumerate(steps):
                 run = run_system(wirings[way], coupling=WAYS[way].coupling, step=step, stop_time=stop_time)
                 done += 1.0 / step

@@ -177,12 +177,11 @@ class System:
                 found[freedom.mode.name] = float(freedom.mode.arguments.index(driven[0].argument))
         return found
 
-    def wiring(self, folder: str | Path | None = None, *, fmi: int = 2) -> Wiring:
-        """Build the FMUs of the system in a folder, by default in the user's cache, and return the wiring.
+    def wiring(self, *, fmi: int = 2) -> Wiring:
+        """Build the FMUs of the system in the user's cache, and return the wiring.
 
         Parameters
         ----------
-        folder : path, optional
         fmi : int
             Version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0.
 
@@ -193,10 +192,8 @@ class System:
         WiringError, UnknownNameError
             If a connection is not valid.
         """
-        place = code_folder("systems") if folder is None else Path(folder)
-        parts = {
-            name: Part.from_fmu(name, member.build(place, fmi), member.values) for name, member in self.members.items()
-        }
+        place = code_folder("systems")
+        parts = {name: Part.from_fmu(name, m.build(place, fmi), m.values) for name, m in self.members.items()}
         return Wiring(
             title=self.title,
             parts=parts,

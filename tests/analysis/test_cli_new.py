@@ -8,7 +8,7 @@ import pytest
 
 from analysis.cli.new import LINKAGE, case_text, kinds
 from analysis.files import Many, Quantity, Whole, entry_names
-from analysis.files.template import example, meanings
+from analysis.files.template import example
 from analysis.linkages.description import Body, Description, Gear, Rack, Slide, Slot, Spring
 from analysis.mechanisms import MECHANISMS
 from analysis.run import RunTable, case_inputs, load_case, load_parameters
@@ -168,21 +168,6 @@ def test_what_it_does_not_write(linkwork, tmp_path):
     assert [line.split()[0] for line in linkwork("new").output.splitlines()] == list(kinds())
 
 
-class _Described:
-    """What entries mean.
-
-    Attributes
-    ----------
-    short : float
-        A length; within `bounds` (m).
-    long, other : float
-        The first sentence says what it is (a length; not a time). The second one, which is not needed in a file, says
-        why it is so; a third.
-    unit : float
-        m
-    """
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_entry_of_a_synthesis_is_explained_to_who_writes_it(kind):
     """Not to who reads the code, as the docstring of a function does."""
@@ -197,11 +182,3 @@ def test_examples_are_the_quantities_that_they_stand_for():
     assert quantity(example(Quantity("rad/s")), "rad/s", "speed") == pytest.approx(1.0)
     assert quantity(example(Quantity("rad")), "rad", "angle") == pytest.approx(pi / 6.0)
     assert example(Many(Whole(least=2))) == [2]
-
-
-def test_of_a_long_meaning_the_first_sentence_stays():
-    assert meanings(_Described) == {
-        "short": "A length; within bounds (m)",
-        "long": "The first sentence says what it is",
-        "other": "The first sentence says what it is",
-    }

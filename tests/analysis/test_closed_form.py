@@ -492,10 +492,6 @@ def test_command_of_a_function(linkwork: Callable[..., Result]) -> None:
     result = linkwork(EXAMPLES / "five-poses.toml", "--crank-phase", "10 deg")
     assert result.exit_code == cli.WRONG
     assert "poses leave the crank's angle free" in result.output
-    for example in ("five-poses.toml", "sine-function.toml"):
-        result = linkwork(EXAMPLES / example, "--count", 3)
-        assert result.exit_code == cli.WRONG
-        assert "--count is for four poses" in result.output
 
 
 @pytest.mark.parametrize(

@@ -250,7 +250,6 @@ class TestCommand:
             (("--time-unit", "mm"), "--time-unit"),
             (("--mass", "600 mm"), "--mass"),
             (("--mass", "0"), "above zero"),
-            (("--least-swing", "0"), "least swing"),
         ],
     )
     def test_what_is_wrong_is_said(self, options: tuple[str, ...], words: str) -> None:

@@ -49,7 +49,6 @@ from analysis import (
     variant,
     with_isolas,
 )
-from analysis.display import format_count
 from analysis.periodic import basins
 from analysis.run import published_case, save_parameters
 from analysis.slider_crank import sensitivities
@@ -351,19 +350,6 @@ def test_a_picture_of_a_periodic_motion() -> None:
     assert np.ptp(y) == pytest.approx(2e3 * fixed.amplitude, rel=1e-3)
     assert plane.lines[1].get_xdata()[0] == pytest.approx(1e3 * fixed.start[0])
     assert sorted(multipliers.lines[1].get_xdata()) == sorted(fixed.multipliers.real)
-
-
-@pytest.mark.parametrize(
-    ("count", "what", "words"),
-    [
-        (1, "branch", "1 branch"),
-        (2, "branch", "2 branches"),
-        (0, "problem", "no problems"),
-        (3, "boundary", "3 boundaries"),
-    ],
-)
-def test_counts_in_words(count: int, what: str, words: str) -> None:
-    assert format_count(count, what) == words
 
 
 PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "slider")

@@ -252,8 +252,6 @@ def test_wrong_arguments_are_refused() -> None:
             run_system(wiring, step=step, stop_time=stop_time)
     with pytest.raises(InputError, match="does not divide"):
         convergence(system_of("motor-crank"), [1e-3, 4e-4], stop_time=0.1)
-    with pytest.raises(UnknownNameError, match="derivatives"):
-        convergence(system_of("motor-crank"), ways=["derivative"])
     with pytest.raises(InputError, match="the system has 0 power bonds"):
         run_system(wiring_of("slider-tracking"), share=1e-3)
     with pytest.raises(UnknownNameError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from math import tau
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, output_folder, print_error, print_paths, say, show_table, tolerance_option
+from ..common import CHECK_FAILED, fail, output_folder, print_paths, say, show_table, tolerance_option
 from .options import MechanismChoice, add_mechanism_options, out_option, problem_options
 
 
@@ -69,8 +68,7 @@ def dual(chosen: MechanismChoice, tolerance: float, two_rotations: bool, out: st
         f"about the rod's line, which no equation asks for: {found.rod_moment * units.factor('N.m'):.1e} {units.name('N.m')}"
     )
     if not all(passed):
-        print_error("check failed: the two do not agree", "red")
-        sys.exit(CHECK_FAILED)
+        fail("check failed: the two do not agree", CHECK_FAILED)
     say("the two agree", style="green")
 
 

@@ -27,8 +27,8 @@ from ..common import (
     changes,
     check_kind,
     in_units,
+    note,
     number_or_text,
-    print_error,
     quantity,
     report_errors,
 )
@@ -281,11 +281,6 @@ def _given(torque: str | None, load: str | None) -> dict[str, float]:
     if torque is not None:
         return {"torque": quantity(torque, "N.m", "--torque")}
     return {"load": quantity("0" if load is None else load, "N", "--load")}
-
-
-def note(text: str) -> None:
-    """Print a note on standard error."""
-    print_error(f"note: {text}")
 
 
 def angle_text(value: float) -> str:

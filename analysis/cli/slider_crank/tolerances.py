@@ -12,12 +12,11 @@ import numpy as np
 from linkwork.errors import InputError
 
 from ... import slider_crank as sc
-from ..common import console, output_folder, print_paths, quantity, save_plot, show_table, workers_options
+from ..common import console, note, output_folder, print_paths, quantity, save_plot, show_table, workers_options
 from .options import (
     MechanismChoice,
     Units,
     add_mechanism_options,
-    note,
     out_option,
     plot_option,
     problem_options,
