@@ -351,20 +351,9 @@ def case_kind(tables: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
-    """Check that a file is of a kind that a command reads.
+    """Check that a file is of one of the ``wanted`` kinds, such as `RUN`; the error names the command for another kind.
 
-    Parameters
-    ----------
-    path : str
-    *wanted : (str, str)
-        The kinds that the command reads, such as `RUN`.
-    settings : iterable of str
-        Dotted names of entries that options of the command line add to the file's entries.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is of another kind; the message names the command for this kind.
+    ``settings`` are dotted names of entries that options of the command line add to the file's entries.
     """
     from ..files import read_tables
 
@@ -435,19 +424,9 @@ def show_table(
     unwrapped: Collection[str] = (),
     styles: Iterable[str | None] = repeat(None),
 ) -> None:
-    """Print a table; columns of numbers are aligned to the right.
+    """Print a table with a row of ``headings``, unless there are none; columns of numbers are aligned to the right.
 
-    Parameters
-    ----------
-    title : str
-    headings : sequence of str
-        Headings of the columns.
-    rows : iterable of sequence of str
-        Cells of each row.
-    unwrapped : collection of str
-        Headings of the columns whose cells are not wrapped.
-    styles : iterable of str, optional
-        Styles of the rows, by their names in the library rich.
+    ``unwrapped`` are headings of columns whose cells are not wrapped; ``styles`` are styles of rows, by their names in rich.
     """
     grid, rows = Table(title=plain_text(title), title_justify="left", show_header=bool(headings)), list(rows)
     for place, heading in enumerate(headings):

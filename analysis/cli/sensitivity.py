@@ -20,18 +20,9 @@ _NAMED = 4
 def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> list[Path]:
     """Print the parameters that move each special point and its amplitude most; write all elasticities to a table.
 
-    Parameters
-    ----------
-    response : Response
-    factor, unit
-        Unit in which the parameter of the response is printed, and the factor from SI to this unit.
-    path : str
-        Path of the table. It has one row for each special point, in the order in which the points are printed.
-
-    Returns
-    -------
-    list of Path
-        The paths written; empty if there is no special point with a gradient.
+    The parameter of the response is printed in ``unit``; ``factor`` is the factor from SI to it. The table at ``path`` has one
+    row for each special point, in the order in which the points are printed. Without a special point with a gradient no path
+    is returned.
     """
     from ..files import write_csv
     from ..periodic import gradient_names, parameter_value, special_gradient

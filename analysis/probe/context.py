@@ -19,39 +19,20 @@ AFTER_FATAL, FAILED = 3, 70
 
 @dataclass(slots=True, kw_only=True)
 class Context:
-    """The context of a check: the FMU, the journal of calls, and the file of findings.
-
-    Parameters
-    ----------
-    model : Model
-    library : Library
-    folder : pathlib.Path
-        The extracted FMU.
-    work : pathlib.Path
-        A folder for the files of the probe.
-    journal : Journal
-    findings : pathlib.Path
-        File to which findings are appended, one line of JSON each.
-    seed : int
-        Seed of the random numbers.
-    check : str
-        Name of the check.
-    avoided : frozenset of str
-        Keys of the forbidden calls that crashed an earlier process; they are not tried again.
-    faults : list
-        Faults that the forbidden calls try, once they are listed.
-    """
+    """The context of a check: the FMU, the journal of calls, and the file of findings."""
 
     model: Model
     library: Library
-    folder: Path
-    work: Path
+    folder: Path  # the extracted FMU
+    work: Path  # for the files of the probe
     journal: Journal
-    findings: Path
-    seed: int
-    check: str
-    avoided: frozenset[str] = frozenset()
-    faults: list[Any] = field(default_factory=list)
+    findings: Path  # findings are appended to this file, one line of JSON each
+    seed: int  # of the random numbers
+    check: str  # name of the check
+    avoided: frozenset[str] = (
+        frozenset()
+    )  # keys of forbidden calls that crashed an earlier process; they are not tried again
+    faults: list[Any] = field(default_factory=list)  # what the forbidden calls try, once it is listed
     _shown: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def session(self) -> Session:

@@ -23,20 +23,9 @@ _EVENT_ITERATIONS = 100
 class Run:
     """A run of one instance, from its initialization on.
 
-    The constructor initializes the instance. A step is a communication step (co-simulation) or a step of Euler's method (model
-    exchange).
-
-    Parameters
-    ----------
-    session : Session
-    instantiate : bool
-        False for a session that already has an instance, for example one that was reset.
-    start : mapping, optional
-        Values of variables to set before the initialization.
-    stop : float, optional
-        Stop time that is given to the FMU; by default none is given.
-    finish : bool
-        False to stay in initialization mode.
+    The constructor sets the values ``start`` and initializes the instance; with ``finish`` false it stays in initialization
+    mode. With ``instantiate`` false the session already has an instance, for example one that was reset. A step is a
+    communication step (co-simulation) or a step of Euler's method (model exchange).
     """
 
     def __init__(

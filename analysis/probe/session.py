@@ -72,16 +72,7 @@ class Library:
 
 
 class Session:
-    """An instance of an FMU, which may not exist if the FMU refused to make it.
-
-    Parameters
-    ----------
-    library : Library
-    model : Model
-    journal : Journal
-    folder : pathlib.Path
-        Folder to which the FMU was extracted.
-    """
+    """An instance of an FMU, which may not exist if the FMU refused to make it; ``folder`` has the extracted FMU."""
 
     def __init__(self, library: Library, model: Model, journal: Journal, folder: Path) -> None:
         self.library, self.model, self.journal, self.folder = library, model, journal, folder

@@ -62,15 +62,7 @@ def value(rng: random.Random, variable: Variable) -> Any:
 
 
 class Walk:
-    """A walk through the states of one instance by random legal calls.
-
-    Parameters
-    ----------
-    session : Session
-    rng : random.Random
-    note : Note
-        Function to which findings are passed.
-    """
+    """A walk through the states of one instance by random legal calls; findings are passed to ``note``."""
 
     def __init__(self, session: Session, rng: random.Random, note: Note) -> None:
         self.session, self.rng, self.note = session, rng, note

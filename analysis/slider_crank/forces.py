@@ -89,23 +89,10 @@ def solve(
 ) -> Solution:
     """Solve one of the force problems at configurations that can be assembled, on arrays or dual numbers.
 
-    Parameters
-    ----------
-    p : Constants
-    angle, shift, speed, acceleration
-        theta1 (rad), the shift's motion, theta1' (rad/s) and theta1'' (rad/s2).
-    given
-        The load (N) or, if ``torque`` is true, the torque (N.m).
-    torque : bool
-        Whether the torque is given and the load sought. The load is not finite where the ratio is zero.
-    groove : bool
-        Whether the parameters' groove makes the shift.
-
-    Returns
-    -------
-    Solution
-        ``ratio`` is minus the derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the
-        shaft makes the shift.
+    The arguments are constants, theta1 (rad), the shift's motion, theta1' (rad/s) and theta1'' (rad/s2); ``given`` is the load
+    (N) or, with ``torque``, the torque (N.m): the load is then sought, which is not finite where the ratio is zero. ``groove``
+    says whether the parameters' groove makes the shift. The ratio is minus the derivative of the torque with respect to the
+    load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the shift.
     """
     f = plant_functions()
     q = f.position(angle, shift.shift, p)

@@ -103,13 +103,7 @@ def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
 
 
 def array_per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
-    """Return an array with a finite value for each of n crank angles, from one value or n values.
-
-    Raises
-    ------
-    InputError
-        If the value is neither a finite number nor n finite numbers.
-    """
+    """Return an array with a finite value for each of n crank angles, from one value or n; raise InputError for others."""
     values = float_array(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
     if values.shape not in ((), (1,), (n,)):
         raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")

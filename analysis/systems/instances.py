@@ -35,14 +35,8 @@ def _unpack(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDi
 class Instance:
     """An FMI 2.0 instance of a part of a system; call `start_initialisation`, `finish_initialisation`, then `step`.
 
-    Attributes
-    ----------
-    messages : list of str
-        Logged messages.
-    outputs : tuple of str
-        Names of the part's real outputs, in the order of `read`.
-    goes_back : bool
-        Whether the part can save and restore its state.
+    It has the logged ``messages``, the names of the part's real ``outputs`` in the order of `read`, and ``goes_back``: whether
+    the part can save and restore its state.
     """
 
     _running: type = FMU2Slave
@@ -96,19 +90,10 @@ class Instance:
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
     ) -> None:
-        """Set inputs for a step.
+        """Set inputs for a step to their values at its start, with their slopes over it; without slopes they are held.
 
-        Parameters
-        ----------
-        names : sequence of str
-        values : float array
-            Values at the start of the step.
-        slopes : float array or None
-            Derivatives of the inputs with respect to time over the step; None if the inputs are held.
-        middle : float
-            Time from the start of the step (s). A part that accepts no slopes holds the inputs at their values at this time.
-        updated : bool
-            Whether an FMI 3.0 part follows the slopes by intermediate updates.
+        A part that accepts no slopes holds the inputs at their values ``middle`` (s) after the start of the step. ``updated``
+        says whether an FMI 3.0 part follows the slopes by intermediate updates.
         """
         references = [self.part.ports[name].reference for name in names]
         lines = slopes is not None and self._interpolates
