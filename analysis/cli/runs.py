@@ -304,10 +304,13 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
     only standard cases of its mechanism are taken.
     """
     from ..mechanisms import find_mechanism
-    from ..run import CASES, load_case
+    from ..run import CASES, list_interfaces, load_case, read_description
 
     if not names or everything:
-        model = None if fmu is None else _model_name(Path(fmu))
+        model = None
+        if fmu is not None:
+            list_interfaces(fmu)  # it says what is wrong with a file that is no FMU
+            model = str(read_description(fmu).modelName)
         of_model = [(name, find_mechanism(case.parameters).fmu) for name, case in CASES.items()]
         of_model = [(name, its_model) for name, its_model in of_model if model in (None, its_model)]
         first = {its_model: name for name, its_model in reversed(of_model)}
@@ -323,18 +326,6 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
         else:
             raise common.unknown_name_error(name, CASES, f"standard case or case file {name!r}")
     return chosen
-
-
-def _model_name(path: Path) -> str | None:
-    """Return the name of the model in an FMU; None if the FMU cannot be read (the check reports this later)."""
-    from ..files import check_fmu
-    from ..run import read_description
-
-    try:
-        check_fmu(path)
-        return str(read_description(path).modelName)
-    except InputError:
-        return None
 
 
 def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) -> None:

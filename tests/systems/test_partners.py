@@ -189,9 +189,8 @@ def test_state_feedback_and_its_limit() -> None:
 
 
 def test_a_motion_reference_is_its_series_and_the_rate_its_derivative() -> None:
-    series = controller(
-        "motion-reference", motion_0=0.5, motion_cos_1=0.2, motion_sin_3=-0.1, load_sin_2=7.0, speed=4.0
-    )
+    values = {"motion_0": 0.5, "motion_cos_1": 0.2, "motion_sin_3": -0.1, "load_sin_2": 7.0, "speed": 4.0}
+    series = controller("motion-reference", **values)
     step, places = 1e-6, []
     for angle in (0.7 - step, 0.7 + step, 0.7):
         series.angle = angle
@@ -242,11 +241,7 @@ def test_gains_and_limits_act_from_the_next_sample_on() -> None:
     [
         ("pid", {"sample_time": 0.01}, "sample_time is a fixed parameter"),
         ("pid", {"gain": float("nan")}, "gain is nan: it must be a finite number"),
-        (
-            "pid",
-            {"gain": 3.0, "tracking_time": 0.0},
-            "tracking_time is 0.0: it must be a finite number greater than zero",
-        ),
+        ("pid", {"gain": 3.0, "tracking_time": 0.0}, "tracking_time is 0.0: .* a finite number greater than zero"),
         ("state-feedback", {"limit": -1.0}, "limit is -1.0: it must be a finite number and not negative"),
         ("pid", {"limit": float("inf")}, "limit is inf: it must be a finite number and not negative"),
         ("dc-servo", {"inductance": 0.0}, "inductance is 0.0: it must be a finite number greater than zero"),
@@ -327,9 +322,8 @@ def test_states_of_a_controller_that_are_damaged_or_of_another_are_refused(tmp_p
 
 @pytest.mark.parametrize("name", PARTNERS)
 def test_the_balance_of_energy_of_a_partner_closes(name: str) -> None:
-    run = simulate(
-        name if load_linkage(Path(str(HERE / "partners" / f"{name}.toml"))) else "", stop_time=0.2, step=1e-3
-    )
+    load_linkage(Path(str(HERE / "partners" / f"{name}.toml")))
+    run = simulate(name, stop_time=0.2, step=1e-3)
     assert np.abs(run["energy.residual"]).max() < 1e-6
 
 
