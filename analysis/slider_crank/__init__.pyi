@@ -2,6 +2,7 @@ from .closure import Closure as Closure
 from .closure import ClosureError as ClosureError
 from .closure import Settled as Settled
 from .closure import close as close
+from .closure import follow as follow
 from .closure import settle as settle
 from .closure import shortage as shortage
 from .dual_dynamics import Comparison as Comparison
@@ -46,6 +47,7 @@ from .shifts import ConstantShift as ConstantShift
 from .shifts import GrooveShift as GrooveShift
 from .shifts import ShiftLaw as ShiftLaw
 from .shifts import ShiftMotion as ShiftMotion
+from .shifts import TimeShift as TimeShift
 from .tolerances import ANGLE as ANGLE
 from .tolerances import DIMENSIONS as DIMENSIONS
 from .tolerances import ERRORS as ERRORS

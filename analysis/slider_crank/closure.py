@@ -124,6 +124,14 @@ class Closure(Loops):
     length_residual: FloatArray
     iterations: int
 
+    def at(self, points: Any) -> Closure:
+        """Return the loops of the points with given indices (array_like of int), for example to start near them."""
+        return replace(self, **{name: getattr(self, name)[points] for name in _POINTWISE})
+
+
+#: Fields of `Closure` that have a value for each point.
+_POINTWISE = tuple(x.name for x in fields(Closure) if x.name not in ("parameters", "iterations"))
+
 
 def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     """Return the start of the iteration: the planar slider-crank of section 2.6.2.
@@ -148,9 +156,28 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     )
 
 
+def _start_nearby(start: Closure, th: Array, s1: Array) -> Loops:
+    """Return start loops with the rod orientation of nearby closed loops: one loop for all points, or one for each point."""
+    if start.crank_angle.size not in (1, th.size):
+        raise InputError(
+            f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
+        )
+    crank_ball = about_k(start.crank_angle - th).real @ start.crank_ball
+    return Loops(
+        parameters=start.parameters,
+        crank_angle=th,
+        shift=s1,
+        crank_ball=crank_ball,
+        slider_ball=np.broadcast_to(start.slider_ball, crank_ball.shape),
+        slider_position=np.broadcast_to(start.slider_position, th.shape),
+    )
+
+
 @takes_published()
 @in_si(crank_angle="rad", shift="m")
-def close(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
+def close(
+    parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount, start: Closure | None = None
+) -> Closure:
     """Close the loop at each of the given crank angles and shifts by Newton's method.
 
     Parameters
@@ -159,11 +186,14 @@ def close(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount)
         The mechanism; its ``assembly_branch`` chooses the assembly.
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m); numbers, or arrays of shape (n,).
+    start : Closure, optional
+        Closed loops near the wanted loops, one for all points or one for each point: the iteration starts with their rod
+        orientation in space. By default it starts from the planar slider-crank.
 
     Raises
     ------
     InputError
-        If an angle or a shift is not a finite number, or their shapes do not agree.
+        If an angle or a shift is not a finite number, or their shapes or the number of loops in ``start`` do not agree.
     AssemblyError
         If the rod does not reach the guide; the message gives the greatest missing length and its crank angle.
     ClosureError
@@ -178,7 +208,7 @@ def close(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount)
             f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} "
             f"m: the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
         )
-    loops = planar_loops(p, th, s1)
+    loops = planar_loops(p, th, s1) if start is None else replace(_start_nearby(start, th, s1), parameters=p)
     iterations, found = 0, False
     while not found and iterations < MAX_ITERATIONS:
         iterations += 1
@@ -194,6 +224,33 @@ def close(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount)
     closed = Closure(rotation_residual=rotation, length_residual=distance, iterations=iterations, **own)
     _check(closed)
     return closed
+
+
+@takes_published()
+@in_si(crank_angle="rad", shift="m")
+def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
+    """Close the loop by continuation: start the first point from the planar slider-crank, every other from the point before.
+
+    The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+        The mechanism.
+    crank_angle, shift : array_like
+        theta1 (rad) and S1 (m) in the order of the motion, numbers or arrays of shape (n,).
+
+    Raises
+    ------
+    InputError, AssemblyError, ClosureError
+        As `close`; a step that would change the assembly is a ClosureError.
+    """
+    th, s1 = broadcast_points(crank_angle, shift)
+    points: list[Closure] = []
+    for angle, position in zip(th, s1):
+        points.append(close(parameters, angle, position, points[-1] if points else None))
+    joined: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in points]) for name in _POINTWISE}
+    return Closure(parameters=parameters, iterations=max(x.iterations for x in points), **joined)
 
 
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
@@ -264,14 +321,15 @@ def _check(found: Closure) -> None:
     if not error[worst] <= TOLERANCE:
         raise ClosureError(
             f"loop closure residual {rotation[worst]:.1e} rad and {distance[worst]:.1e} m after {found.iterations} "
-            f"iterations at {place(worst)}, though the rod reaches the guide"
+            f"iterations at {place(worst)}, though the rod reaches the guide: start nearer to the solution"
         )
     # the slider pin is beyond the crank pin's foot on the guide, in the direction -k4
     side = -p.assembly_branch * found.slider_ball[:, 0, 2]
     worst = int(np.argmin(side))
     if side[worst] < 0.0:
         raise ClosureError(
-            f"the loop closes in assembly {-p.assembly_branch:+d} at {place(worst)}, not in {p.assembly_branch:+d} as asked"
+            f"the loop closes in assembly {-p.assembly_branch:+d} at {place(worst)}, not in {p.assembly_branch:+d} as asked: "
+            "start nearer to it"
         )
 
 

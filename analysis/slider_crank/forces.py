@@ -178,7 +178,7 @@ class ForceTurn:
 
     @property
     def _course(self) -> Course:
-        return Course(self.parameters, self.law)
+        return Course(self.parameters, self.law, float(self.speed[0]))
 
     @property
     def _span(self) -> tuple[float, float]:
@@ -366,7 +366,7 @@ def force_turn(
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2). Here and below, a number may be given as text with its unit, such as "50 rpm".
     shift : ShiftLaw
-        `ConstantShift`, `GrooveShift`, `AngleShift` or another law. The parameters' own groove is not used.
+        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another law. The parameters' own groove is not used.
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional

@@ -45,7 +45,7 @@ class ShiftMotion(NamedTuple):
 
 @runtime_checkable
 class ShiftLaw(Protocol):
-    """Interface of a law: the crank's axial shift as a function of its angle."""
+    """Interface of a law: the crank's axial shift as a function of its angle, or of time at constant speed."""
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """Return shift and rates at crank angles (rad) with speeds (rad/s) and accelerations (rad/s2) of the same shape."""
@@ -127,7 +127,7 @@ class GrooveShift:
             return None
 
 
-#: A function on arrays of angles.
+#: A function on arrays of angles or times.
 ArrayFunction: TypeAlias = Callable[[FloatArray], ArrayLike]
 
 
@@ -156,6 +156,39 @@ class AngleShift:
         return None
 
 
+@dataclass(frozen=True, slots=True)
+class TimeShift:
+    """A shift given as a function of time with its first two derivatives, for a crank of constant speed.
+
+    ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 when the
+    crank angle is 0.
+
+    Raises
+    ------
+    InputError
+        If the law is evaluated at a crank speed that is zero or varies; use an `AngleShift` instead.
+    """
+
+    value: ArrayFunction
+    velocity: ArrayFunction
+    acceleration: ArrayFunction
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """Return shift and rates; see `ShiftLaw.at`."""
+        w = np.unique(speed)
+        if w.size != 1 or w[0] == 0.0 or np.any(acceleration):
+            raise InputError(
+                "a shift given over time needs a constant crank speed other than 0 rad/s, which gives the time of each angle; "
+                "use an AngleShift instead"
+            )
+        time = angle / w[0]
+        return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))
+
+    def periodic_shift(self, parameters: SliderCrankParameters) -> None:
+        """Return None: the law need not repeat after whole turns."""
+        return None
+
+
 def has_shaft_groove(law: ShiftLaw) -> bool:
     """Return whether the shift is made by a groove in the crank's shaft."""
     return isinstance(law, GrooveShift) and law.in_shaft
@@ -174,10 +207,14 @@ _PIECES = 1440
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A mechanism whose shift follows a law over the crank angle."""
+    """A mechanism whose shift follows a law over the crank angle.
+
+    ``speed`` is the crank speed (rad/s). It matters only if the shift is a function of time.
+    """
 
     parameters: SliderCrankParameters
     law: ShiftLaw
+    speed: float
 
     def limits(self, low: float, high: float) -> tuple[float, ...]:
         """Find the crank angles from ``low`` to ``high`` (rad) at which a range of assembly ends."""
@@ -219,7 +256,7 @@ class Course:
         def slope(angle: FloatArray) -> FloatArray:
             moving = self._shift(angle)
             k = f.coefficients(f.position(angle, moving.shift, p), p)
-            return np.asarray(k.kth + pitch * moving.velocity * k.ks)
+            return np.asarray(k.kth + pitch * moving.velocity / (self.speed or 1.0) * k.ks)
 
         at = _search_angles(low, high)
         reached = self._assembly_square(at) > (LIMIT_SINE * p.a2) ** 2
@@ -236,7 +273,7 @@ class Course:
         return tuple(found)
 
     def _shift(self, angle: FloatArray) -> ShiftMotion:
-        moving = self.law.at(angle, np.ones(angle.shape), np.zeros(angle.shape))
+        moving = self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
         # a function of a law may return a number for all angles
         return ShiftMotion(*(np.broadcast_to(x, angle.shape) for x in moving))
 

@@ -67,18 +67,42 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """An FMU of a system."""
+    """An FMU of a system.
+
+    Attributes
+    ----------
+    name : str
+    fmu : path
+        An FMU for co-simulation, FMI 2.0 or 3.0.
+    ports : mapping of str to Port
+        All variables of the FMU.
+    values : mapping of str to float
+        Start values by variable; all other variables have the start values of the FMU.
+    feeds : mapping of str to tuple of str
+        Inputs on which an output depends directly, by the name of the output.
+    description : object
+        Model description as read by FMPy.
+    """
 
     name: str
-    fmu: Path  # for co-simulation, FMI 2.0 or 3.0
-    ports: Mapping[str, Port]  # all variables of the FMU
-    values: Mapping[str, float]  # start values by variable; all other variables have those of the FMU
-    feeds: Mapping[str, tuple[str, ...]]  # for each output that depends directly on inputs, these inputs
-    description: Any  # model description as read by FMPy
+    fmu: Path
+    ports: Mapping[str, Port]
+    values: Mapping[str, float]
+    feeds: Mapping[str, tuple[str, ...]]
+    description: Any
 
     @classmethod
     def from_fmu(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
-        """Read a part from its FMU; refuse a file that is no FMU of a part, and ``values`` that do not fit its variables."""
+        """Read a part from its FMU.
+
+        Raises
+        ------
+        InputError
+            If the file is no FMU.
+        WiringError
+            If the FMU is not for co-simulation with FMI 2.0 or 3.0, a name in ``values`` is no parameter or input of it, or a
+            value is not of the type of its variable.
+        """
         check_fmu(fmu)
         description = read_description(fmu)
         if description.coSimulation is None or not description.fmiVersion.startswith(("2", "3")):

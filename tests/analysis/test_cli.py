@@ -171,6 +171,13 @@ def test_a_bare_speed_under_which_a_run_ends_early_is_asked_about(linkwork, tmp_
     )
 
 
+def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
+    for group in ([], ["slider-crank"], ["system"]):
+        listed = linkwork(*group, "--help").output.partition("Commands:")[2].split("\n  ")[1:]
+        assert len(listed) > 4
+        assert all(" ".join(line.split()).endswith(".") and "..." not in line for line in listed)
+
+
 def test_stability_judges_before_it_asks_for_an_axis_that_nobody_chose(linkwork):
     result = linkwork("stability", "--published", "table-3.1", "--set", "slider.damping=0")
     assert result.exit_code == 1

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.numerics.dual import Dual, about_i, about_j, about_k
-from analysis.slider_crank import ClosureError, close, shortage
+from analysis.slider_crank import ClosureError, close, follow, shortage
 from analysis.slider_crank import closure as C
 from analysis.slider_crank.closure import planar_loops, residuals
 from analysis.units import INCH
@@ -62,6 +62,31 @@ def test_random_mechanisms_close_and_agree_with_the_closed_form(case: Case) -> N
     between = found.slider_pin[0] - found.crank_pin[0]
     np.testing.assert_allclose(between, case.p.a2 * found.rod_frame.real[0, :, 0], atol=1e-10)
     np.testing.assert_allclose(found.guide_frame.real[0, :, 2], [0.0, case.p.sa, case.p.ca], atol=1e-10)
+
+
+@every_case
+def test_continuation_finds_the_same_round_the_turn_and_back_to_its_start(offset: float, twist: float) -> None:
+    p = parameters(offset, twist)
+    turn = np.linspace(0.5, 0.5 + 2.0 * pi, 25)
+    found = follow(p, turn, 9.0 * INCH)
+    np.testing.assert_allclose(found.slider_position, close(p, turn, 9.0 * INCH).slider_position, rtol=0.0, atol=1e-12)
+    assert found.slider_position[-1] == pytest.approx(found.slider_position[0], abs=1e-12)
+
+
+def test_continuation_turns_the_rod_without_spin() -> None:
+    """Between near points the rod's rotation has no component along the rod: omega . u = 0, to the square of the step."""
+    spins = []
+    for steps in (36, 72):
+        found = follow(parameters(20.0, 232.0), np.linspace(0.0, 2.0 * pi, steps + 1), 6.0 * INCH)
+        rods = found.rod_frame.real
+        turns = rods[1:] @ np.swapaxes(rods[:-1], 1, 2)
+        vectors = 0.5 * np.stack(
+            [turns[:, 2, 1] - turns[:, 1, 2], turns[:, 0, 2] - turns[:, 2, 0], turns[:, 1, 0] - turns[:, 0, 1]], -1
+        )
+        along = np.abs(np.sum(vectors * (rods[1:, :, 0] + rods[:-1, :, 0]), -1)) / 2.0
+        spins.append(along.max())
+        assert np.linalg.norm(vectors, axis=-1).max() > 1e2 * along.max()
+    assert spins[1] < spins[0] / 3.5
 
 
 def test_the_estimate_is_the_closed_loop_of_the_planar_mechanism() -> None:
@@ -157,6 +182,28 @@ def test_the_half_turned_loop_is_not_taken_for_closed() -> None:
     assert distance[0] == 0.0
 
 
+def test_a_start_at_the_other_assembly_is_reported() -> None:
+    p = parameters(10.0)
+    other = close(replace(p, assembly_branch=-1), 0.3, 0.0)
+    with pytest.raises(ClosureError, match="closes in assembly -1"):
+        close(p, 0.31, 0.0, start=other)
+
+
+def test_a_start_nearby_is_used() -> None:
+    p = parameters(10.0, 232.0)
+    start = close(p, 0.3, 0.05)
+    found = close(p, [0.3, 0.31], 0.05, start=start)
+    assert found.iterations <= 3
+    np.testing.assert_allclose(found.slider_position, close(p, [0.3, 0.31], 0.05).slider_position, atol=1e-13)
+
+
+def test_a_start_of_another_number_of_loops_is_refused() -> None:
+    p = parameters(10.0)
+    for count, points in ((2, [0.1, 0.2, 0.3]), (3, 0.1)):
+        with pytest.raises(InputError, match=f"start has {count} loops"):
+            close(p, points, 0.0, start=close(p, np.linspace(0.1, 0.3, count), 0.0))
+
+
 def test_an_iteration_that_ends_open_is_reported_with_its_residual(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(C, "MAX_ITERATIONS", 1)
     with pytest.raises(ClosureError, match=r"residual .* rad and .* m after 1 iterations at theta1 = 0.7 rad"):
@@ -185,6 +232,7 @@ def test_rod_perpendicular_to_the_guide_is_the_last_loop_that_closes(twist: floa
         ([], 0.0, "one axis"),
     ],
 )
-def test_points_that_are_none_are_refused(angle: Any, shift: Any, message: str) -> None:
+@pytest.mark.parametrize("how", [close, follow])
+def test_points_that_are_none_are_refused(how: Any, angle: Any, shift: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        close(parameters(), angle, shift)
+        how(parameters(), angle, shift)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.optimize import brentq
 
-from analysis.slider_crank import DeadCentreError, JointLoads, Rates, close, joint_loads, rates
+from analysis.slider_crank import DeadCentreError, JointLoads, Rates, close, follow, joint_loads, rates
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
@@ -61,7 +61,7 @@ def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis(offset: float, 
         assert np.abs(found.residual).max() < 1e-9 * np.abs(found.bearing_moment).max()
         (clear,) = np.nonzero(np.abs(rates(at, speed=1.0).ratio) > 0.02 * p.crank_length)
         torque = found.torque[clear]
-        sought = joint_loads(close(p, COARSE[clear], shift * INCH), speed=CRANK_SPEED, torque=torque)
+        sought = joint_loads(at.at(clear), speed=CRANK_SPEED, torque=torque)
         np.testing.assert_array_equal(sought.torque, torque)
         assert_same(sought, [expected[i] for i in clear], 1e-9)
 
@@ -91,6 +91,18 @@ def test_agrees_with_vector_mechanics_for_random_mechanisms_and_motions(case: Ca
     lever = abs(k.kth) / p.crank_length
     if lever > 1e-3:
         assert_same(joint_loads(found, **motion, torque=expected[0].torque), [expected], 1e-10 / lever + 1e-9)
+
+
+def test_points_and_start_of_the_iteration_do_not_matter() -> None:
+    """Continuation gives the rod another spin than closing each point for itself; the forces are the same."""
+    p = seeded(5).parameters
+    th = np.linspace(0.0, 0.5, 6) + seeded(5).state[0]
+    s1 = seeded(5).state[1]
+    motion = {"speed": 3.0, "shift_velocity": 0.4, "acceleration": -7.0, "shift_acceleration": 2.0, "slider_force": 5.0}
+    one, other = joint_loads(close(p, th, s1), **motion), joint_loads(follow(p, th, s1), **motion)
+    assert np.abs(one.closure.crank_ball - other.closure.crank_ball).max() > 1e-3
+    for name in (*FORCES, *MOMENTS):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9)
 
 
 # ------------------------------------------------------------------ rates

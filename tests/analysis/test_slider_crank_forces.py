@@ -22,6 +22,7 @@ from analysis.slider_crank import (
     ForceTurn,
     GrooveShift,
     ShiftMotion,
+    TimeShift,
     close,
     constant_shift,
     force_turn,
@@ -178,7 +179,7 @@ def test_groove_in_the_shaft_is_the_plants() -> None:
 
 @pytest.mark.parametrize("branch", [1, -1])
 def test_laws_are_one_another(branch: int) -> None:
-    """The groove's law, and the same as any function of the angle; rates by differences."""
+    """The groove's law, the same as a function of the angle, and of time at constant speed; rates by differences."""
     mechanism = replace(OFFSET, assembly_branch=branch)
     amplitude, ratio, w = 0.06, 3.0, -7.0
     groove = GrooveShift(amplitude, ratio)
@@ -187,19 +188,26 @@ def test_laws_are_one_another(branch: int) -> None:
         lambda th: amplitude * ratio * np.cos(ratio * th),
         lambda th: -amplitude * ratio**2 * np.sin(ratio * th),
     )
-    by_bounds, by_signs = (
-        force_turn(mechanism, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
-        for law in (groove, angle)
+    f = ratio * w
+    time = TimeShift(
+        lambda t: amplitude * np.sin(f * t),
+        lambda t: amplitude * f * np.cos(f * t),
+        lambda t: -amplitude * f * f * np.sin(f * t),
     )
-    for name in ("shift", "shift_velocity", "shift_acceleration", "slider_force"):
-        assert relative(getattr(by_signs, name), getattr(by_bounds, name)) < 1e-9
-    # what is searched by signs is what is searched by bounds
-    for kind in ("dead_centres", "singularities"):
-        found, true = getattr(by_signs, kind), getattr(by_bounds, kind)
-        assert [c.outer for c in found] == [c.outer for c in true]
-        assert [c.crank_angle for c in found] == pytest.approx([c.crank_angle for c in true], abs=1e-9)
-        assert [c.slider_position for c in found] == pytest.approx([c.slider_position for c in true], abs=1e-12)
-    assert by_bounds.dead_centres != by_bounds.singularities
+    turns = [
+        force_turn(mechanism, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
+        for law in (groove, angle, time)
+    ]
+    for turn in turns[1:]:
+        for name in ("shift", "shift_velocity", "shift_acceleration", "slider_force"):
+            assert relative(getattr(turn, name), getattr(turns[0], name)) < 1e-9
+        # what is searched by signs is what is searched by bounds
+        for kind in ("dead_centres", "singularities"):
+            found, true = getattr(turn, kind), getattr(turns[0], kind)
+            assert [c.outer for c in found] == [c.outer for c in true]
+            assert [c.crank_angle for c in found] == pytest.approx([c.crank_angle for c in true], abs=1e-9)
+            assert [c.slider_position for c in found] == pytest.approx([c.slider_position for c in true], abs=1e-12)
+    assert turns[0].dead_centres != turns[0].singularities
     # theta1 = w t + e t^2 / 2 with the law differentiated by time
     e, h, th = 11.0, 1e-4, 0.8
     around = [groove.at(th + w * t + 0.5 * e * t * t, 0.0, 0.0).shift for t in (-h, 0.0, h)]
@@ -416,6 +424,8 @@ def test_csv(tmp_path: Path) -> None:
         ({"angles": [[0.0], [1.0, 2.0]]}, "angles"),
         ({"shift": 3.5}, r"shift is 3.5.*ConstantShift"),
         ({"shift": constant_shift(0.1)}, "ConstantShift"),
+        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_speed": 0.0}, "other than 0 rad/s"),
+        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_acceleration": 1.0}, "constant"),
     ],
 )
 def test_wrong_input_is_reported(changes: dict[str, Any], message: str) -> None:
