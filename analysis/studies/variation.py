@@ -63,6 +63,16 @@ def vary(parameters: T) -> T:
     return replace(parameters, **values) if values else parameters  # type: ignore[type-var]
 
 
+def compared_values(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
+    """Return the values of a parameter that a study compares, or only the reader's value if the reader has set it.
+
+    ``unit`` is the parameter's SI unit; ``per`` is the factor from this unit to the unit of the values.
+    """
+    return next(
+        ((per * quantity(value, unit, name),) for changed, value in _current().changes if changed == name), values
+    )
+
+
 def words() -> str:
     """Return the reader's changes in words; empty if there are no changes."""
     return ", ".join(f"{name} = {value}" for name, value in _current().changes)

@@ -1,16 +1,30 @@
 """The conclusions of Youssef's thesis, sections 8.0 and 9.1."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from analysis.studies.statements import HOLDS, Statement
+from analysis.studies.youssef.conclusions_linear import judge_introduction, judge_linearised
 from analysis.studies.youssef.conclusions_motion import decay, maxima_spacings, ranges_of_turns
 
-from .results import check
+from .results import check, expected
 
 
 @pytest.mark.long
 def test_verdicts() -> None:
     check("conclusions")
+
+
+@pytest.mark.parametrize("part", [judge_introduction, judge_linearised])
+def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...]]) -> None:
+    """Those that take no run of the mechanism."""
+    for s in part():
+        (outcome,) = [verdict for quote, verdict in expected("conclusions").items() if s.quote.startswith(quote)] or [
+            HOLDS
+        ]
+        assert s.outcome == outcome, s.quote
 
 
 def test_spacings_are_those_of_the_maxima_between_the_samples() -> None:

@@ -392,6 +392,17 @@ class TestStatements:
         assert across == sorted(across, reverse=True)
         assert along == sorted(along, reverse=True)
 
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+    def test_all_forces_by_dual_vectors(self, case: Case) -> None:
+        """The joint forces of the plant against those by dual vectors, which share no equation with it."""
+        mechanism, shift = parameters(case.offset_in, case.twist_deg), case.shift_in * INCH
+        clear_of = rahman.clear_mask(case)
+        loads = joint_loads(close(mechanism, THETA[clear_of], shift), speed=CRANK_SPEED, torque=CRANK_TORQUE)
+        for component in COMPONENTS.values():
+            found = rahman.values(case, component)[clear_of]
+            scale = TORQUE_LB_IN if component.unit == "lb.in" else TORQUE_LB_IN / CRANK_IN
+            assert np.abs(found - in_thesis(loads, component)).max() < 1e-9 * scale, component.symbol
+
 
 def in_thesis(loads: JointLoads, component: Component) -> FloatArray:
     """A component of joint loads by dual vectors, in the thesis's unit and sense."""

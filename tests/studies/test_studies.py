@@ -78,7 +78,7 @@ class TestVariation:
         [
             ("R6", "rod.lenght", "did you mean rod.length"),
             ("R6", "guide.twist", "compares values of guide.twist itself"),
-            ("3.4", "slider.stiffness", "compares values of slider.stiffness itself"),
+            ("3.5", "slider.stiffness", "compares values of slider.stiffness itself"),
             ("rahman-forces", "rod.length", "has no parameters that can be changed"),
             ("4.5", "crank.length", "slider_equation takes all parameters for the equation of chapters IV"),
         ],
@@ -86,6 +86,13 @@ class TestVariation:
     def test_a_parameter_without_meaning_is_refused(self, tmp_path: Path, number: str, name: str, words: str) -> None:
         with pytest.raises(InputError, match=words):
             studies.make(number, tmp_path, {name: 1.0})
+
+    def test_the_readers_spring_stands_alone_in_figure_3_4(self, tmp_path: Path) -> None:
+        """Its statements compare the thesis's three springs, so that there are none."""
+        found, _ = studies.make("3.4", tmp_path, {"slider.stiffness": "7.5e5 dyn/cm"})
+        names = [name for name in found.columns if name.startswith("slider position")]
+        assert names == ["slider position u; k = 7.5e5 dyn/cm [cm]"]
+        assert found.statements == ()
 
     def test_what_is_kept_is_kept_by_the_changes(self) -> None:
         """A function that is called with the same arguments gives the changed mechanism's result, and tells its parameters."""
