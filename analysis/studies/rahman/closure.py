@@ -244,7 +244,7 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
             "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
             "the increase of crank axial shift, offset [a4] should be increased.",
             place,
-            "change of the greatest S1 at which the crank turns fully, from one offset to the next",
+            "change of the greatest S1 at which the crank turns fully with alpha4 = 270 deg, from one offset to the next",
             "none, the sign decides",
             tuple(
                 at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")

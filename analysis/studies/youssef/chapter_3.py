@@ -472,7 +472,7 @@ def _torque_conclusion() -> Statement:
             near("torques differ where accelerations do", 1.0, np.mean(unequal[apart > ALIKE] > ALIKE), 0.0),
             at_least("acceleration's part", ALIKE, inertial),
         ),
-        "the accelerations differ by so much at every crank angle, and most where the torques hardly differ",
+        f"the accelerations differ by more than {ALIKE:g} at every crank angle, and most where the torques hardly differ",
     )
 
 

@@ -148,8 +148,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
             text("5.3.1, L3764-3770; the same in L3946-3950"),
             "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative "
-            "to the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A with I4. For the true periodic "
-            "motion, at I4 = 0 for the right linear equation",
+            "to the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A from one I4 to the next. For the "
+            "true periodic motion, at I4 = 0 for the right linear equation",
             f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
             (
                 at_most("distance from the line", ALIKE, bent),
@@ -186,7 +186,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             text("5.1.1, eqs (5.13), (5.16), (5.26), L3404-3416, L3446-3464, L3555-3575"),
             "boundaries by the formulas minus those by the determinant (5.35), for equation (4.29) as printed, relative to "
             "the region's width, and with (5.13) relative to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. "
-            "Signs that our scan lacks follow from (5.2), (5.11) and (5.23); h0 = 0, since the coupler has no mass",
+            "Signs that our scan lacks or has wrong follow from (5.2), (5.11) and (5.23); h0 = 0, since the coupler has no "
+            "mass",
             f"{SMALL:g}, the rule for *small*, for the next order",
             judge_formulas(),
         ),

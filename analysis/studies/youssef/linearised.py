@@ -357,7 +357,7 @@ def _equation() -> list[Statement]:
                 ),
                 near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
             ),
-            "R1 and S1 are read from appendix 2 (L8449); in the scan their term with I4 stands in Q1 (L2781), which is "
+            "R1 and S1 are read from appendix 2 (L8449-8450); in the scan their term with I4 stands in Q1 (L2781), which is "
             "therefore not judged. Nor are G1 and the terms with r4 and with the coupler's mass, which are zero in 4.5",
         ),
     ]
