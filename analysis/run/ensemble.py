@@ -302,11 +302,16 @@ def simulate_many(
         energies=np.full(m, np.nan),
     )
     gathered = _Gathering(where, mechanism, outputs is not None, empty)
-    into = gathered.samples if where is None and share_memory(n_jobs, threads=True) else None
-    with (
-        record_interrupts() as interrupts,
-        show_progress(options.get("progress", False), float(m)) as show,
-    ):
+    return _solve_batches(tasks, gathered, where, n_jobs, options.get("progress", False))
+
+
+def _solve_batches(
+    tasks: Sequence[Task], gathered: _Gathering, folder: Path | None, n_jobs: int | None, progress: bool
+) -> Ensemble:
+    """Solve the batches of an ensemble in parallel and return the ensemble; the error of a broken one has what is done."""
+    m = len(gathered.messages)
+    into = gathered.samples if folder is None and share_memory(n_jobs, threads=True) else None
+    with record_interrupts() as interrupts, show_progress(progress, float(m)) as show:
         try:
             work = partial(solve, interrupts=interrupts, into=into)
             for _, result in run_in_parallel(work, tasks, interrupts, n_jobs=n_jobs, threads=True):
@@ -314,9 +319,9 @@ def simulate_many(
                     gathered.add(result)
                     show(float(gathered.done))
         except WorkersLost as error:
-            raise EnsembleBroken(gathered.ensemble(), where, error) from error
+            raise EnsembleBroken(gathered.ensemble(), folder, error) from error
     if interrupts and gathered.done < m:
-        raise EnsembleInterrupted(gathered.ensemble(), where)
+        raise EnsembleInterrupted(gathered.ensemble(), folder)
     return gathered.ensemble()
 
 

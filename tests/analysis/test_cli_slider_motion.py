@@ -11,21 +11,10 @@ import tomli_w
 from click.testing import CliRunner, Result
 
 from analysis import cli, slider
+from analysis import synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import load_case, load_parameters, read_case, simulate
 from analysis.slider import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
-from analysis.synthesis import (
-    Linkage,
-    Search,
-    SecondCrank,
-    SliderMotion,
-    Solution,
-    SynthesisInterrupted,
-    TimedPath,
-    described_case,
-    synthesize,
-    turn,
-)
 from analysis.systems import load_system
 from linkwork.errors import InputError
 from tests.linkages import BASE
@@ -36,7 +25,7 @@ pytest.importorskip("casadi")
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "slider-motion.toml"
-MOTION = SliderMotion(FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01])), 0.4)
+MOTION = syn.SliderMotion(FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01])), 0.4)
 LINKAGE = {
     name: f"{getattr(BASE, name)!r} {'rad' if name.endswith(('angle', 'phase')) else 'm'}"
     for name in (
@@ -48,7 +37,7 @@ LINKAGE = {
 
 def tables(**more: Any) -> dict[str, Any]:
     """A case: the path of the moved linkage, 24 points, links kept."""
-    points = replace(BASE, pivot=MOTION).path(turn(24)).tolist()
+    points = replace(BASE, pivot=MOTION).path(syn.turn(24)).tolist()
     return {
         "title": "Moved",
         "task": {"kind": "timed-path", "points": points},
@@ -109,7 +98,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert run["slider.position"][:n] == pytest.approx(columns["slider.position [m]"], abs=1e-7)
     assert run["pin.C.fx"][:n] == pytest.approx(columns["pin.C.fx [N]"], abs=1e-3)
     # the plant's frame lies along the ground link, with A at its origin
-    way = turn(24)
+    way = syn.turn(24)
     p = (
         np.interp(way, columns["crank.angle [rad]"], columns["coupler.point.x [m]"], period=2.0 * pi),
         np.interp(way, columns["crank.angle [rad]"], columns["coupler.point.y [m]"], period=2.0 * pi),
@@ -131,10 +120,10 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
 
 def test_a_pivot_that_is_set_and_kept_is_held_in_the_described_linkage(tmp_path) -> None:
     chosen = read(tmp_path, tables(drive={"speed": "60 rpm"}))
-    solution = Solution.from_linkage(
-        chosen.synthesis.task, BASE.with_pivot(SliderMotion(FourierSeries.constant(0.01), 0.4))
+    solution = syn.Solution.from_linkage(
+        chosen.synthesis.task, BASE.with_pivot(syn.SliderMotion(FourierSeries.constant(0.01), 0.4))
     )
-    own = read_case(described_case(solution, chosen.machine(solution), "held"), folder=tmp_path)
+    own = read_case(syn.described_case(solution, chosen.machine(solution), "held"), folder=tmp_path)
     run = simulate(own.parameters, own.inputs, initial=own.initial, stop_time=0.2)
     assert run["pivot.position"] == pytest.approx(np.full(len(run), 0.01), abs=1e-15)
 
@@ -166,7 +155,7 @@ def test_the_motion_over_the_plants_crank_angle() -> None:
     assert motion_of_plant(moved)(phi + BASE.crank_phase) == pytest.approx(MOTION.series(phi), abs=1e-15)
     assert motion_of_plant(BASE)(phi) == pytest.approx(np.zeros(17))
     with pytest.raises(InputError, match="second crank"):
-        motion_of_plant(BASE.with_pivot(SecondCrank(length=0.01)))
+        motion_of_plant(BASE.with_pivot(syn.SecondCrank(length=0.01)))
 
 
 def test_a_spring_takes_part_of_the_force(linkwork, tmp_path) -> None:
@@ -244,7 +233,7 @@ def test_the_strategy_stops_where_it_is_good_enough_and_says_why(linkwork, tmp_p
 
 
 def test_a_second_crank_has_no_forces(linkwork, tmp_path) -> None:
-    points = BASE.with_pivot(SecondCrank(length=0.03, ratio=2, phase=-0.8)).path(turn(24)).tolist()
+    points = BASE.with_pivot(syn.SecondCrank(length=0.03, ratio=2, phase=-0.8)).path(syn.turn(24)).tolist()
     strategy = {"tolerance": "0.01 mm", "harmonics": 1, "ratios": [2], "starts": 4}
     case = tables(strategy=strategy, slider={}, drive={"speed": "60 rpm"})
     case["task"]["points"] = points
@@ -264,13 +253,15 @@ def test_nothing_is_good_enough(linkwork) -> None:
 
 
 def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork, tmp_path) -> None:
-    wanted = TimedPath(points=replace(BASE, pivot=MOTION).path(turn(24)))
+    wanted = syn.TimedPath(points=replace(BASE, pivot=MOTION).path(syn.turn(24)))
     search = {"starts": 4, "candidates": 4096}
     case = tables(search=search, constraints={"largest_link": "300 mm"})
     del case["linkage"]
     found = read(tmp_path, case)
     first = found.find_four_bar()
-    result = synthesize(wanted, constraints=found.synthesis.constraints, search=Search(starts=4, candidates=4096))
+    result = syn.synthesize(
+        wanted, constraints=found.synthesis.constraints, search=syn.Search(starts=4, candidates=4096)
+    )
     assert first.error == pytest.approx(result.best.error, rel=1e-12)
     result.to_csv(tmp_path / "solutions.csv")
     for rank, solution in enumerate(result.solutions, start=1):
@@ -339,7 +330,7 @@ def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
         found = slider.slider_motion(task, *arguments, **options)
         done.append(found)
         if len(done) == 2:
-            raise SynthesisInterrupted(found, 3, 6)
+            raise syn.SynthesisInterrupted(found, 3, 6)
         return found
 
     monkeypatch.setattr("analysis.slider.cases.slider_motion", stopped)
@@ -419,8 +410,8 @@ def test_bad_input_is_one_sentence(linkwork, tmp_path, change: dict[str, Any], w
 
 def test_a_list_of_linkages_is_checked(tmp_path) -> None:
     good = tmp_path / "solutions.csv"
-    task = TimedPath(points=BASE.path(turn(12)))
-    synthesize(task, search=Search(starts=2, candidates=1024)).to_csv(good)
+    task = syn.TimedPath(points=BASE.path(syn.turn(12)))
+    syn.synthesize(task, search=syn.Search(starts=2, candidates=1024)).to_csv(good)
     with pytest.raises(InputError, match="none of rank 99"):
         linkage_from_csv(good, 99)
 
@@ -440,5 +431,5 @@ def test_the_motion_is_read_with_its_units(tmp_path) -> None:
     assert u.guide_angle == pytest.approx((radians(20.0), radians(20.0)))
     assert u.position == pytest.approx((-0.01, 0.02))
     assert (u.stroke, u.speed, u.acceleration) == pytest.approx((0.025, 0.03, 0.05))
-    assert isinstance(chosen.linkage, Linkage)
+    assert isinstance(chosen.linkage, syn.Linkage)
     assert chosen.linkage.values() == BASE.values()

@@ -9,32 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
+from analysis import synthesis as syn
 from analysis.slider import greatest_derivative, slider_motion
 from analysis.studies.youssef.problems import PROBLEMS
-from analysis.synthesis import (
-    ANGLES,
-    LENGTHS,
-    Assembly,
-    CrankUnknown,
-    FullTurn,
-    InfeasibleError,
-    LeastTransmission,
-    Linkage,
-    RockerFunction,
-    Search,
-    SecondCrank,
-    SliderMotion,
-    SliderUnknown,
-    Synthesis,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    evaluate,
-    normal_form,
-    synthesize,
-    turn,
-)
 from analysis.synthesis.linkage.kernels import link_directions
 from analysis.synthesis.result.report import displacements
 from analysis.synthesis.search.program import Program, make_linkage, make_start, random_pivot
@@ -50,18 +27,18 @@ PRINTED = WEIGHTED.linkage
 
 
 @cache
-def moved(harmonics: int, **bounds: float) -> Synthesis:
+def moved(harmonics: int, **bounds: float) -> syn.Synthesis:
     """The printed weighted linkage with a slider."""
-    return slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=harmonics, **bounds))
+    return slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=harmonics, **bounds))
 
 
-def shown(result: Synthesis) -> float:
+def shown(result: syn.Synthesis) -> float:
     """Error of the best as the thesis counts it, in deg2."""
     return WEIGHTED.convert(result.best.error)
 
 
-def dimensions(linkage: Linkage) -> dict[str, float]:
-    return {name: getattr(linkage, name) for name in (*LENGTHS, *ANGLES, "branch")}
+def dimensions(linkage: syn.Linkage) -> dict[str, float]:
+    return {name: getattr(linkage, name) for name in (*syn.LENGTHS, *syn.ANGLES, "branch")}
 
 
 # Series 1 and 2 of the thesis
@@ -70,12 +47,12 @@ def dimensions(linkage: Linkage) -> dict[str, float]:
 def test_series_1_with_two_harmonics() -> None:
     """The goal is 0.76 at N = 24, the best that was found before 0.722; the thesis prints 4.8, which no reading confirms."""
     assert shown(moved(2)) <= 0.7221
-    assert WEIGHTED.convert(evaluate(WEIGHTED.task, moved(2).best.linkage).error) == shown(moved(2))
+    assert WEIGHTED.convert(syn.evaluate(WEIGHTED.task, moved(2).best.linkage).error) == shown(moved(2))
 
 
 def test_series_2_with_two_harmonics() -> None:
     """The goal is 4.05 cm2, the best that was found before 3.99; the thesis prints 4.3."""
-    found = slider_motion(PATH_B.task, PATH_B.linkage, SliderUnknown(harmonics=2), search=Search(starts=10))
+    found = slider_motion(PATH_B.task, PATH_B.linkage, syn.SliderUnknown(harmonics=2), search=syn.Search(starts=10))
     assert PATH_B.convert(found.best.error) <= 4.05
     assert found.best.verdicts.sound
     # fitted at more stations than the task has, and told at the task's
@@ -87,12 +64,12 @@ def test_series_2_with_two_harmonics() -> None:
 
 
 @pytest.mark.parametrize("linkage", [PRINTED, PATH_B.linkage], ids=["rocker", "path"])
-def test_the_links_are_kept_to_the_bit(linkage: Linkage) -> None:
+def test_the_links_are_kept_to_the_bit(linkage: syn.Linkage) -> None:
     problem = WEIGHTED if linkage is PRINTED else PATH_B
-    found = slider_motion(problem.task, linkage, SliderUnknown(harmonics=1), search=Search(starts=3))
+    found = slider_motion(problem.task, linkage, syn.SliderUnknown(harmonics=1), search=syn.Search(starts=3))
     for solution in found.solutions:
         assert dimensions(solution.linkage) == dimensions(linkage)
-        assert isinstance(solution.linkage.pivot, SliderMotion)
+        assert isinstance(solution.linkage.pivot, syn.SliderMotion)
         assert solution.linkage.pivot.series.order == 1
 
 
@@ -136,15 +113,15 @@ def test_solutions_are_different_mechanisms() -> None:
 
 def test_without_harmonics_the_slider_is_set_once() -> None:
     """Along the ground link it is another length of that link."""
-    unknown = SliderUnknown(harmonics=0, guide_angle=(0.0, 0.0))
+    unknown = syn.SliderUnknown(harmonics=0, guide_angle=(0.0, 0.0))
 
     def longer(length: float) -> float:
-        return evaluate(WEIGHTED.task, replace(PRINTED, ground_length=length)).error
+        return syn.evaluate(WEIGHTED.task, replace(PRINTED, ground_length=length)).error
 
     least, most = 0.98 * PRINTED.ground_length, 1.02 * PRINTED.ground_length
     best = minimize_scalar(longer, bounds=(least, most), method="bounded", options={"xatol": 1e-12})
-    found = slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=4))
-    assert isinstance(found.best.linkage.pivot, SliderMotion)
+    found = slider_motion(WEIGHTED.task, PRINTED, unknown, search=syn.Search(starts=4))
+    assert isinstance(found.best.linkage.pivot, syn.SliderMotion)
     assert found.best.linkage.pivot.stroke == 0.0
     assert found.best.error == pytest.approx(best.fun, rel=1e-9)
     assert PRINTED.ground_length + found.best.linkage.pivot.series.mean == pytest.approx(best.x, abs=1e-8)
@@ -156,9 +133,9 @@ def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
         found = slider_motion(
             WEIGHTED.task,
             PRINTED,
-            SliderUnknown(harmonics=harmonics),
+            syn.SliderUnknown(harmonics=harmonics),
             guesses=[previous.best.linkage],
-            search=Search(starts=4),
+            search=syn.Search(starts=4),
         )
         assert found.best.error <= previous.best.error * (1.0 + 1e-9)
         previous = found
@@ -167,7 +144,9 @@ def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
 
 def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
     guess = moved(2).best.linkage
-    found = slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), guesses=[guess], search=Search(starts=0))
+    found = slider_motion(
+        WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=2), guesses=[guess], search=syn.Search(starts=0)
+    )
     assert found.starts == 1
     assert found.best.error <= moved(2).best.error * (1.0 + 1e-9)
 
@@ -175,22 +154,24 @@ def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
 # Derivatives
 
 
-def gradient_by_kernels(task: Task, linkage: Linkage, unknown: SliderUnknown | CrankUnknown) -> FloatArray:
+def gradient_by_kernels(
+    task: syn.Task, linkage: syn.Linkage, unknown: syn.SliderUnknown | syn.CrankUnknown
+) -> FloatArray:
     """d(quality)/d(unknowns of the pivot), SI: the columns dx and dy of the compiled Jacobian, and the pivot's own geometry."""
     phi = np.asarray(task.rotation)
-    if isinstance(task, RockerFunction):
-        residual = evaluate(task, linkage).errors[None, :]
+    if isinstance(task, syn.RockerFunction):
+        residual = syn.evaluate(task, linkage).errors[None, :]
         jacobian = linkage.link_jacobian(phi)[1][:, 1:2]
     else:
         residual = (linkage.path(phi) - np.asarray(task.points)).T
         jacobian = linkage.path_jacobian(phi)[1]
     waves = [wave(k * phi) for k in range(1, unknown.harmonics + 1) for wave in (np.cos, np.sin)]
     pivot = linkage.pivot
-    if isinstance(pivot, SliderMotion):
+    if isinstance(pivot, syn.SliderMotion):
         along = np.exp(1j * pivot.guide_angle)
         moves = [1j * along * pivot.series(phi), along + 0.0 * phi, *[along * wave for wave in waves]]
     else:
-        assert isinstance(pivot, SecondCrank)
+        assert isinstance(pivot, syn.SecondCrank)
         arm = np.exp(1j * pivot.angle(phi))
         moves = [arm, *[1j * pivot.length * arm * wave for wave in (1.0 + 0.0 * phi, *waves)]]
     weights = np.asarray(task.weights)
@@ -201,11 +182,11 @@ def gradient_by_kernels(task: Task, linkage: Linkage, unknown: SliderUnknown | C
 @pytest.mark.parametrize("kind", ["path", "rocker"])
 @pytest.mark.parametrize(
     "unknown",
-    [SliderUnknown(harmonics=3), CrankUnknown(ratio=-2, length=(0.01, 0.1), harmonics=2)],
+    [syn.SliderUnknown(harmonics=3), syn.CrankUnknown(ratio=-2, length=(0.01, 0.1), harmonics=2)],
     ids=["slider", "second-crank"],
 )
 def test_the_program_has_the_gradient_of_the_kernels(
-    kind: str, unknown: SliderUnknown | CrankUnknown, seed: int
+    kind: str, unknown: syn.SliderUnknown | syn.CrankUnknown, seed: int
 ) -> None:
     """And its value; both differ from the plant's closure by nothing but how they are written."""
     random = np.random.default_rng(seed)
@@ -217,11 +198,11 @@ def test_the_program_has_the_gradient_of_the_kernels(
     weights = random.uniform(0.5, 2.0, 11)
     if kind == "path":
         points = shape.path(phi) + 0.05 * random.standard_normal((11, 2))
-        task: Task = TimedPath(points=points, rotation=phi, weights=weights)
+        task: syn.Task = syn.TimedPath(points=points, rotation=phi, weights=weights)
     else:
         angle = shape.rocker_angle(phi) + 0.05 * random.standard_normal(11)
-        task = RockerFunction(angle=angle, rotation=phi, weights=weights)
-    normal = normal_form(task)
+        task = syn.RockerFunction(angle=angle, rotation=phi, weights=weights)
+    normal = syn.normal_form(task)
     limits = make_limits(task, normal, {n: (v, v) for n, v in dimensions(shape).items() if n != "branch"}, ())
     start = make_start(shape, normal, unknown)
     start = replace(start, pivot=0.1 * random_pivot(unknown, start.q[2], normal.unit, random))
@@ -230,9 +211,9 @@ def test_the_program_has_the_gradient_of_the_kernels(
     at = np.concatenate([start.q, start.pivot]), program.unknowns_and_parameters(start)[1]
     value, gradient = program.evaluate(*at)[0], program.gradient_and_jacobian(*at)[0]
     size = normal.unit**2
-    assert size * value == pytest.approx(evaluate(task, linkage).error, rel=1e-11)
+    assert size * value == pytest.approx(syn.evaluate(task, linkage).error, rel=1e-11)
     units = np.full(len(start.pivot), normal.unit)
-    units[0 if isinstance(unknown, SliderUnknown) else slice(1, None)] = 1.0
+    units[0 if isinstance(unknown, syn.SliderUnknown) else slice(1, None)] = 1.0
     by_kernels = gradient_by_kernels(task, linkage, unknown)
     assert size * gradient[11:] / units == pytest.approx(by_kernels, rel=1e-8, abs=1e-10 * np.abs(by_kernels).max())
     # and by differences of what the task measures
@@ -241,7 +222,7 @@ def test_the_program_has_the_gradient_of_the_kernels(
         for step in (-1e-6, 1e-6):
             pivot = start.pivot.copy()
             pivot[k] += step
-            ends.append(evaluate(task, make_linkage(replace(start, pivot=pivot), normal, unknown)).error)
+            ends.append(syn.evaluate(task, make_linkage(replace(start, pivot=pivot), normal, unknown)).error)
         slope = (ends[1] - ends[0]) / 2e-6 / units[k]
         assert slope == pytest.approx(by_kernels[k], rel=1e-4, abs=1e-6 * np.abs(by_kernels).max())
 
@@ -249,13 +230,13 @@ def test_the_program_has_the_gradient_of_the_kernels(
 # Bounds of the motion
 
 
-def bounded(name: str) -> tuple[float, float, Linkage, Synthesis]:
+def bounded(name: str) -> tuple[float, float, syn.Linkage, syn.Synthesis]:
     """The bound at seven tenths of what the free optimum has, what the bounded one has, and both."""
     free = moved(2).best.linkage
 
-    def has(linkage: Linkage) -> float:
+    def has(linkage: syn.Linkage) -> float:
         if name == "stroke":
-            assert isinstance(linkage.pivot, SliderMotion)
+            assert isinstance(linkage.pivot, syn.SliderMotion)
             return linkage.pivot.stroke
         return greatest_derivative(linkage, {"speed": 1, "acceleration": 2}[name])
 
@@ -269,12 +250,14 @@ def test_a_bound_is_kept_and_is_reached(name: str) -> None:
     """It is held at so many rotations, and by so much the more tightly, that it is passed nowhere."""
     bound, value, _, result = bounded(name)
     assert 0.995 * bound <= value <= bound * (1.0 + 1e-6)
-    assert shown(moved(2)) < shown(result) < shown(slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=0)))
+    assert (
+        shown(moved(2)) < shown(result) < shown(slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=0)))
+    )
 
 
 def test_the_position_is_kept_within_its_bounds() -> None:
     free = moved(2).best.linkage.pivot
-    assert isinstance(free, SliderMotion)
+    assert isinstance(free, syn.SliderMotion)
     phi = np.linspace(0.0, 2.0 * pi, 720)
     assert np.ptp(free.series(phi)) > 0.04
     found = moved(2, position=(-0.01, 0.015)).best.linkage.pivot
@@ -299,7 +282,7 @@ def test_the_guide_is_fixed_bounded_or_free() -> None:
 def test_the_links_keep_their_transmission_angle() -> None:
     angle = radians(35.0)
     found = slider_motion(
-        WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), constraints=(LeastTransmission(angle=angle),)
+        WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=2), constraints=(syn.LeastTransmission(angle=angle),)
     )
     # a margin of 0.15 degrees is for what lies between the rotations that are looked at
     assert angle <= found.best.linkage.least_transmission <= angle + radians(0.16)
@@ -316,15 +299,15 @@ def test_links_and_slider_together_beat_either() -> None:
         for name in ("crank_length", "coupler_length", "rocker_length")
     }
     bounds |= {"ground_length": (PRINTED.ground_length,) * 2, "crank_phase": (-pi, pi)}
-    links = synthesize(WEIGHTED.task, bounds, (FullTurn(),), search=Search(starts=8))
+    links = syn.synthesize(WEIGHTED.task, bounds, (syn.FullTurn(),), search=syn.Search(starts=8))
     slider = moved(1)
     both = slider_motion(
         WEIGHTED.task,
         PRINTED,
-        SliderUnknown(harmonics=1),
+        syn.SliderUnknown(harmonics=1),
         bounds=bounds,
         guesses=[slider.best.linkage, links.best.linkage],
-        search=Search(starts=6),
+        search=syn.Search(starts=6),
     )
     assert both.best.error < 0.5 * min(links.best.error, slider.best.error)
     changed = both.best.linkage
@@ -339,30 +322,32 @@ def test_links_and_slider_together_beat_either() -> None:
 
 def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
     t = np.linspace(-1.0, 1.0, 31)
-    path = TargetPath(points=np.column_stack([0.1 * t, 0.02 * np.cos(2.5 * t) + 0.01 * t**3]), closed=False)
-    task = UntimedPath(path=path, measure="distance", samples=36)
-    four_bar = synthesize(task, search=Search(starts=4, candidates=1 << 12)).best
-    found = slider_motion(task, four_bar, SliderUnknown(harmonics=1, stroke=0.05), search=Search(starts=4))
+    path = syn.TargetPath(points=np.column_stack([0.1 * t, 0.02 * np.cos(2.5 * t) + 0.01 * t**3]), closed=False)
+    task = syn.UntimedPath(path=path, measure="distance", samples=36)
+    four_bar = syn.synthesize(task, search=syn.Search(starts=4, candidates=1 << 12)).best
+    found = slider_motion(task, four_bar, syn.SliderUnknown(harmonics=1, stroke=0.05), search=syn.Search(starts=4))
     assert found.best.error <= four_bar.error
     assert dimensions(found.best.linkage) == dimensions(four_bar.linkage)
     with pytest.raises(InputError, match="open path"):
-        slider_motion(task, four_bar.linkage, SliderUnknown(harmonics=1), search=Search(starts=2))
+        slider_motion(task, four_bar.linkage, syn.SliderUnknown(harmonics=1), search=syn.Search(starts=2))
 
 
 # Manners
 
 
 def test_the_path_of_the_crank_pin_is_left_as_it_is() -> None:
-    pin = Linkage(ground_length=0.16, crank_length=0.05, coupler_length=0.15, rocker_length=0.15, point_distance=0.0)
-    task = UntimedPath(path=TargetPath(points=pin.path(turn(24)) * [0.9, 1.0], closed=True))
-    moved = slider_motion(task, pin, SliderUnknown(harmonics=1, stroke=0.02), search=Search(starts=2))
-    assert moved.best.error == pytest.approx(evaluate(task, pin).error)
+    pin = syn.Linkage(
+        ground_length=0.16, crank_length=0.05, coupler_length=0.15, rocker_length=0.15, point_distance=0.0
+    )
+    task = syn.UntimedPath(path=syn.TargetPath(points=pin.path(syn.turn(24)) * [0.9, 1.0], closed=True))
+    moved = slider_motion(task, pin, syn.SliderUnknown(harmonics=1, stroke=0.02), search=syn.Search(starts=2))
+    assert moved.best.error == pytest.approx(syn.evaluate(task, pin).error)
 
 
 def test_what_cannot_be_joined_is_infeasible() -> None:
-    unknown = SliderUnknown(harmonics=1, position=(0.5, 0.6), guide_angle=(0.0, 0.0))
-    with pytest.raises(InfeasibleError, match="no linkage keeps all bounds and constraints"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=3))
+    unknown = syn.SliderUnknown(harmonics=1, position=(0.5, 0.6), guide_angle=(0.0, 0.0))
+    with pytest.raises(syn.InfeasibleError, match="no linkage keeps all bounds and constraints"):
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=syn.Search(starts=3))
 
 
 @pytest.mark.parametrize(
@@ -379,19 +364,19 @@ def test_what_cannot_be_joined_is_infeasible() -> None:
 )
 def test_an_unknown_motion_is_checked(options: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        SliderUnknown(**options)
+        syn.SliderUnknown(**options)
 
 
 def test_bad_input_is_named() -> None:
-    unknown = SliderUnknown(harmonics=1)
+    unknown = syn.SliderUnknown(harmonics=1)
     with pytest.raises(InputError, match="at least one of either"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=0))
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=syn.Search(starts=0))
     with pytest.raises(InputError, match="0 cores"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(n_jobs=0))
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=syn.Search(n_jobs=0))
     with pytest.raises(ParameterError, match="crank_lenght"):
         slider_motion(WEIGHTED.task, PRINTED, unknown, bounds={"crank_lenght": (0.1, 0.2)})
 
 
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
     with pytest.raises(InputError, match="require assembly -1, but the linkage has assembly"):
-        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))
+        slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=1), constraints=(syn.Assembly(branch=-1),))

@@ -7,49 +7,32 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis import synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import Step, Strategy, StrategyInterrupted, simplest_mechanism
 from analysis.slider import strategy as strategy_module
 from analysis.studies.youssef.problems import PROBLEMS
-from analysis.synthesis import (
-    ANGLES,
-    LENGTHS,
-    FullTurn,
-    InfeasibleError,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    RockerFunction,
-    Search,
-    SecondCrank,
-    SliderMotion,
-    Solution,
-    SynthesisInterrupted,
-    TimedPath,
-    evaluate,
-    turn,
-)
 from linkwork.errors import InputError
 from tests.linkages import BASE
 
 pytest.importorskip("casadi")
 
 MM2 = 1e-6
-PHI = turn(24)
+PHI = syn.turn(24)
 
 
-def links_of(linkage: Linkage, share: float = 0.0) -> dict[str, tuple[float, float]]:
+def links_of(linkage: syn.Linkage, share: float = 0.0) -> dict[str, tuple[float, float]]:
     """Bounds about a linkage's dimensions: this share of the ground link, or that many radians, to either side."""
-    spread = dict.fromkeys(LENGTHS, share * linkage.ground_length) | dict.fromkeys(ANGLES, share)
+    spread = dict.fromkeys(syn.LENGTHS, share * linkage.ground_length) | dict.fromkeys(syn.ANGLES, share)
     return {n: (getattr(linkage, n) - d, getattr(linkage, n) + d) for n, d in spread.items() if n != "output_angle"}
 
 
-def strategy(traced: Linkage, tolerance: float, *, starts: int = 4, **options: Any) -> Strategy:
+def strategy(traced: syn.Linkage, tolerance: float, *, starts: int = 4, **options: Any) -> Strategy:
     """For the path of a linkage, its links known but for a few hundredths."""
-    task = TimedPath(points=traced.path(PHI))
+    task = syn.TimedPath(points=traced.path(PHI))
     assert np.isfinite(task.points).all()
-    usual = {"bounds": links_of(BASE, 0.02), "constraints": (FullTurn(),), "harmonics": 2, "stroke": 0.08}
-    return simplest_mechanism(task, tolerance, **usual | options, search=Search(starts=starts))
+    usual = {"bounds": links_of(BASE, 0.02), "constraints": (syn.FullTurn(),), "harmonics": 2, "stroke": 0.08}
+    return simplest_mechanism(task, tolerance, **usual | options, search=syn.Search(starts=starts))
 
 
 def test_a_four_bar_is_enough_for_what_one_traces() -> None:
@@ -65,7 +48,7 @@ def test_a_four_bar_is_enough_for_what_one_traces() -> None:
 def test_a_slider_where_a_four_bar_is_not_enough() -> None:
     """Two harmonics were used to trace it: four-bar, one harmonic, two, and there it stops."""
     series = FourierSeries(np.array([0.0, 0.012, 0.008]), np.array([0.0, 0.010, -0.009]))
-    found = strategy(replace(BASE, pivot=SliderMotion(series, 0.4)), 0.01 * MM2, bounds=links_of(BASE))
+    found = strategy(replace(BASE, pivot=syn.SliderMotion(series, 0.4)), 0.01 * MM2, bounds=links_of(BASE))
     assert [step.mechanism for step in found.steps] == [
         "four-bar",
         "four-bar with a moved slider, 1 harmonic",
@@ -76,10 +59,10 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
     assert found.met
     assert found.chosen is found.steps[-1]
     linkage = found.chosen.solution.linkage
-    assert isinstance(linkage.pivot, SliderMotion)
+    assert isinstance(linkage.pivot, syn.SliderMotion)
     moved = np.array(linkage.displacement(PHI))
     assert moved == pytest.approx(
-        np.array(replace(linkage, pivot=SliderMotion(series, 0.4)).displacement(PHI)), abs=1e-6
+        np.array(replace(linkage, pivot=syn.SliderMotion(series, 0.4)).displacement(PHI)), abs=1e-6
     )
     for step in found.steps[:-1]:
         ratio = step.value / (0.01 * MM2)
@@ -88,7 +71,7 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
 
 def test_gears_where_a_slider_is_not_enough() -> None:
     """The path of a five-bar with gears 2:1, the second crank's stroke wider than the slider's."""
-    gear = SecondCrank(length=0.03, ratio=2, phase=-0.8)
+    gear = syn.SecondCrank(length=0.03, ratio=2, phase=-0.8)
     found = strategy(BASE.with_pivot(gear), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE, 0.01))
     assert [step.mechanism for step in found.steps] == [
         "four-bar",
@@ -98,7 +81,7 @@ def test_gears_where_a_slider_is_not_enough() -> None:
     ]
     assert found.met
     linkage = found.chosen.solution.linkage
-    assert isinstance(linkage.pivot, SecondCrank)
+    assert isinstance(linkage.pivot, syn.SecondCrank)
     assert linkage.pivot.ratio == 2
     assert linkage.pivot.length == pytest.approx(gear.length, rel=1e-3)
     assert (np.diff([found.steps[0].value, found.steps[1].value, found.steps[3].value]) < 0.0).all()
@@ -106,7 +89,7 @@ def test_gears_where_a_slider_is_not_enough() -> None:
 
 def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
     psi = FourierSeries(np.array([0.0, 0.5]), np.array([0.0, -0.4]))
-    arm = SecondCrank(length=0.03, ratio=2, phase=0.9, series=psi)
+    arm = syn.SecondCrank(length=0.03, ratio=2, phase=0.9, series=psi)
     found = strategy(BASE.with_pivot(arm), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE))
     assert [step.mechanism for step in found.steps][-2:] == [
         "five-bar, second crank geared 2:1",
@@ -126,9 +109,14 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1], [0.0, 0.0]])
     s = np.linspace(0.0, 4.0, 24, endpoint=False)
     square = np.column_stack([np.interp(s, range(5), corners[:, k]) for k in (0, 1)])
-    limits = (LeastTransmission(), LargestLink(length=0.4))
+    limits = (syn.LeastTransmission(), syn.LargestLink(length=0.4))
     found = simplest_mechanism(
-        TimedPath(points=square), 1e-3 * MM2, constraints=limits, harmonics=1, ratios=(-1,), search=Search(starts=3)
+        syn.TimedPath(points=square),
+        1e-3 * MM2,
+        constraints=limits,
+        harmonics=1,
+        ratios=(-1,),
+        search=syn.Search(starts=3),
     )
     assert not found.met
     assert len(found.steps) == 4
@@ -139,7 +127,9 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     for step in found.steps:
         assert step.solution.linkage.largest_link <= 0.4 * (1.0 + 1e-6)
         assert step.solution.linkage.least_transmission > radians(39.5)
-        assert step.solution.error == pytest.approx(evaluate(TimedPath(points=square), step.solution.linkage).error)
+        assert step.solution.error == pytest.approx(
+            syn.evaluate(syn.TimedPath(points=square), step.solution.linkage).error
+        )
     assert str(found).splitlines() == [f"{step.mechanism}: {step.reason}" for step in found.steps]
 
 
@@ -151,8 +141,8 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
         radians(14.0),
         criterion="worst",
         bounds=links_of(weighted.linkage),
-        constraints=(FullTurn(),),
-        search=Search(starts=8),
+        constraints=(syn.FullTurn(),),
+        search=syn.Search(starts=8),
     )
     assert found.criterion == "worst"
     assert found.met
@@ -165,8 +155,8 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
         1.0,
         criterion="error",
         bounds=links_of(weighted.linkage),
-        constraints=(FullTurn(),),
-        search=Search(starts=2),
+        constraints=(syn.FullTurn(),),
+        search=syn.Search(starts=2),
     )
     assert len(error.steps) == 1
     assert f"is within {degrees(degrees(1.0)):.4g} deg2: accepted" in str(error)
@@ -174,7 +164,7 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
 
 def test_the_stroke_is_kept() -> None:
     series = FourierSeries(np.array([0.0, 0.02]), np.array([0.0, 0.0]))
-    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
+    traced = replace(BASE, pivot=syn.SliderMotion(series, 0.4))
     found = strategy(traced, 1e-6 * MM2, bounds=links_of(BASE), stroke=0.02, harmonics=1, ratios=())
     slider = found.steps[1].solution.linkage.pivot
     assert slider.stroke == pytest.approx(0.02, rel=0.005)
@@ -187,7 +177,7 @@ def test_the_stroke_is_kept() -> None:
 def test_without_a_solution_a_step_has_none() -> None:
     """A second crank of at least a thousandth of the stroke, 1 m, cannot be joined to these links."""
     series = FourierSeries(np.array([0.0, 0.02, 0.01, 0.01]), np.zeros(4))
-    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
+    traced = replace(BASE, pivot=syn.SliderMotion(series, 0.4))
     found = strategy(
         traced, 1e-6 * MM2, bounds=links_of(BASE), harmonics=1, ratios=(1, 2), stroke=1000.0, second_crank=2.0
     )
@@ -200,9 +190,9 @@ def test_without_a_solution_a_step_has_none() -> None:
 
 
 def test_constraints_without_even_a_four_bar() -> None:
-    task = RockerFunction(angle=1.2 + 0.4 * np.sin(PHI))
+    task = syn.RockerFunction(angle=1.2 + 0.4 * np.sin(PHI))
     bounds = {"crank_length": (0.3, 0.4), "coupler_length": (0.01, 0.1), "rocker_length": (0.01, 0.1)}
-    with pytest.raises(InfeasibleError, match="no shape of four-bar is within the bounds"):
+    with pytest.raises(syn.InfeasibleError, match="no shape of four-bar is within the bounds"):
         simplest_mechanism(task, 1e-3, bounds=bounds)
 
 
@@ -216,26 +206,26 @@ def test_constraints_without_even_a_four_bar() -> None:
         (1.0, {"stroke": "-5 mm"}, "stroke is -0.005 m"),
         (1.0, {"criterion": "best"}, "criterion 'best'"),
         (1.0, {"harmonics": 0}, "0 harmonics"),
-        (1.0, {"search": Search(starts=0)}, "starts"),
+        (1.0, {"search": syn.Search(starts=0)}, "starts"),
         (1.0, {"stroke": -0.1}, "stroke"),
         (1.0, {"second_crank": 0.0}, "second crank"),
         (1.0, {"ratios": (1, 0.5)}, "0.5"),
         (1.0, {"ratios": (float("nan"),)}, "ratio nan"),
         (1.0, {"harmonics": 1.5}, "1.5 harmonics"),
-        (1.0, {"search": Search(starts=2.5)}, "2.5 starts"),
+        (1.0, {"search": syn.Search(starts=2.5)}, "2.5 starts"),
     ],
 )
 def test_bad_input_is_named_before_anything_is_searched(
     monkeypatch: pytest.MonkeyPatch, tolerance: float | str, options: dict[str, Any], words: str
 ) -> None:
     monkeypatch.setattr(strategy_module, "synthesize", lambda *_, **__: pytest.fail("searched"))
-    task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
+    task = syn.TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
     with pytest.raises(InputError, match=words):
         simplest_mechanism(task, tolerance, **options)
 
 
 def step_of(verdicts: dict[str, bool], error: float) -> Step:
-    solution = Solution.from_linkage(TimedPath(points=BASE.path(PHI)), BASE)
+    solution = syn.Solution.from_linkage(syn.TimedPath(points=BASE.path(PHI)), BASE)
     solution = replace(solution, verdicts=replace(solution.verdicts, **verdicts))
     return Step(mechanism="one", solution=solution, value=error, reason="")
 
@@ -270,11 +260,11 @@ def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: i
             return real(*arguments, **more)
         if not best:
             raise KeyboardInterrupt
-        raise SynthesisInterrupted(replace(real(*arguments, **more), complete=False), 1, 4)
+        raise syn.SynthesisInterrupted(replace(real(*arguments, **more), complete=False), 1, 4)
 
     monkeypatch.setattr(strategy_module, "synthesize", stopped)
     with pytest.raises(StrategyInterrupted, match=f"stopped after {stop + best} mechanisms") as caught:
-        strategy(replace(BASE, pivot=SliderMotion(series, 0.4)), 1e-20 * MM2, starts=1, bounds=links_of(BASE))
+        strategy(replace(BASE, pivot=syn.SliderMotion(series, 0.4)), 1e-20 * MM2, starts=1, bounds=links_of(BASE))
     kept = caught.value.strategy
     if stop + best == 0:
         assert kept is None
