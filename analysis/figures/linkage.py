@@ -218,7 +218,7 @@ def draw_linkage(
         If the links cannot be joined there.
     """
     q = _pins(parameters, crank_angle, slider_position)
-    path = CM_PER_METRE * np.reshape([] if trace is None else np.asarray(trace, dtype=float), (-1, 2))
+    path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
     scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
     width, height = scene.high - scene.low
     figure = style.Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))

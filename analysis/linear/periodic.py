@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from math import isfinite, lcm, pi
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,11 +40,34 @@ BETWEEN, IN_ALL, RESOLVED = 2, 2048, 1e-2
 MOST_ITERATIONS = 60
 
 
+class Turn(Protocol):
+    """One period of a motion, sampled at equal steps of the crank angle, without the end point, such as `periodic.Turn`."""
+
+    @property
+    def time(self) -> FloatArray: ...
+
+    @property
+    def period(self) -> float: ...
+
+    @property
+    def states(self) -> FloatArray: ...
+
+    @property
+    def inputs(self) -> FloatArray:
+        """Values of the mechanism's channels at the n samples, shape (n, channels)."""
+        ...
+
+    @property
+    def modes(self) -> Modes:
+        """Values of the mechanism's modes."""
+        ...
+
+
 @runtime_checkable
 class Orbit(Protocol):
-    """A periodic motion that can be sampled at equal steps of the crank angle, such as `analysis.periodic.PeriodicOrbit`."""
+    """A periodic motion that can be sampled, such as `analysis.periodic.PeriodicOrbit`."""
 
-    def turn(self, samples: int, /) -> Any: ...
+    def turn(self, samples: int, /) -> Turn: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -266,7 +289,7 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     raise InputError("the period must be given: only at a constant prescribed speed does it follow from the states")
 
 
-def _resample(mechanism: Mechanism, turn: Any) -> tuple[FloatArray, FloatArray]:
+def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
     """Resample a period at equal time steps instead of equal steps of the crank angle; return the states and the channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T

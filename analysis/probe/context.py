@@ -29,9 +29,8 @@ class Context:
     findings: Path  # findings are appended to this file, one line of JSON each
     seed: int  # of the random numbers
     check: str  # name of the check
-    avoided: frozenset[str] = (
-        frozenset()
-    )  # keys of forbidden calls that crashed an earlier process; they are not tried again
+    # keys of forbidden calls that crashed an earlier process; they are not tried again
+    avoided: frozenset[str] = frozenset()
     faults: list[Any] = field(default_factory=list)  # what the forbidden calls try, once it is listed
     _shown: dict[tuple[str, str], int] = field(default_factory=dict)
 

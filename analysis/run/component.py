@@ -116,11 +116,18 @@ class ComponentModel(_Component):
     def setContinuousStates(self, x: Any, count: int) -> None:
         self.call("set-continuous-states", x[:count])
 
-    def __getattr__(self, name: str) -> Callable[..., Any]:
-        get = super().__getattr__(name)
+    def getContinuousStates(self, x: Any, count: int) -> None:
+        self._write("get-continuous-states", x)
 
-        def write(array: Any, count: int) -> None:
-            for number, value in enumerate(get()):
-                array[number] = value
+    def getContinuousStateDerivatives(self, x: Any, count: int) -> None:
+        self._write("get-continuous-state-derivatives", x)
 
-        return write if name.startswith("get") and re.search("State|Indicator", name) else get
+    def getNominalsOfContinuousStates(self, x: Any, count: int) -> None:
+        self._write("get-nominals-of-continuous-states", x)
+
+    def getEventIndicators(self, z: Any, count: int) -> None:
+        self._write("get-event-indicators", z)
+
+    def _write(self, method: str, array: Any) -> None:
+        for number, value in enumerate(self.call(method)):
+            array[number] = value

@@ -25,6 +25,7 @@ from analysis.periodic import (
 from analysis.periodic.response.branch import _turn_columns
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 SPEED = SETS["table-3.1"].crank_speed
@@ -175,6 +176,19 @@ def test_the_motor_cannot_pass_the_resonance_where_the_torque_folds() -> None:
     # the torque there is what the speed drive needs at the same mean speed, all but for the fluctuation of the speed
     held = find_orbit(parameters, speed=float(speeds[fold.after])).turn()["drive.applied_torque"].mean()
     assert fold.parameter == pytest.approx(held, rel=0.05)
+
+
+def test_a_function_can_vary_what_it_likes() -> None:
+    def both(value: float) -> tuple[FiveBarParameters, Drive]:
+        return replace(TABLE_3_1, slider_stiffness=value, slider_damping=0.03 * value), Drive(speed=SPEED)
+
+    parameters, drive = both(1000.0)
+    family = Family(parameters=parameters, drive=drive, vary=both, name="spring and damper")
+    branch = follow(family, find_orbit(parameters, speed=SPEED), 1000.0, low=900.0, high=1100.0)
+    assert branch.reached
+    assert "spring and damper" in branch.columns()
+    end = find_orbit(both(1100.0)[0], speed=SPEED)
+    assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
 
 
 @pytest.mark.slow

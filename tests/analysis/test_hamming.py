@@ -175,6 +175,22 @@ def test_jump_of_the_right_hand_side_starts_anew() -> None:
     assert solver.y[0] == pytest.approx(pi * np.exp(-50.0 * (4.0 - pi)), abs=1e-6)
 
 
+def test_longest_step_is_kept_to() -> None:
+    result = solve_ivp(pendulum, (0.0, 10.0), START, method=Hamming, max_step=0.03, rtol=1e-3, atol=1e-3)
+    assert np.diff(result.t).max() <= 0.03 * (1.0 + 1e-9)
+
+
+def test_tolerances_by_component() -> None:
+    def f(t: float, y: np.ndarray) -> list[float]:
+        return [-y[0], 1e6 * cos(5.0 * t)]
+
+    tight, loose = (
+        solve_ivp(f, (0.0, 3.0), [1.0, 0.0], method=Hamming, rtol=1e-6, atol=atol).nfev
+        for atol in ([1e-6, 1e-6], [1e-6, 1e6])
+    )
+    assert loose < tight
+
+
 # ------------------------------------------------------------------ manners of a SciPy method
 
 

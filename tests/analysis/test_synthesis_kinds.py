@@ -447,6 +447,24 @@ def five_bar(ratio: float) -> syn.FiveBar:
     )  # fmt: skip
 
 
+def moves(linkage: syn.Linkage, name: str) -> float:
+    """Rms displacement of the coupler point at twelve rotations per unit of a dimension, by differences."""
+    ends = (replace(linkage, **{name: getattr(linkage, name) + h}).path(syn.turn(12)) for h in (1e-6, -1e-6))
+    return float(np.sqrt((np.subtract(*ends) ** 2).sum(axis=1).mean())) / 2e-6
+
+
+@pytest.mark.parametrize(
+    ("linkage", "names"),
+    [(SLIDER, ()), (five_bar(0.5), ("crank_phase", "crank_length", "coupler_length"))],
+    ids=["slider-crank", "geared"],
+)
+def test_displacements_are_limits_of_differences(linkage: syn.Linkage, names: tuple[str, ...]) -> None:
+    made = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(12)) + 1e-3), linkage)
+    found = displacements(made)
+    for name in names or found:
+        assert found[name] == pytest.approx(moves(linkage, name), rel=1e-5, abs=1e-9), name
+
+
 class TestGearedFiveBar:
     @pytest.mark.parametrize(("ratio", "turns"), [(1.0, (1, 1)), (-2.0, (1, -2)), (0.5, (2, 1)), (-1.5, (2, -3))])
     def test_it_is_where_the_law_of_cosines_puts_it(self, ratio: float, turns: tuple[int, int]) -> None:

@@ -745,8 +745,7 @@ class OrbitEquations:
         self._shape = len(self.angles) - 1, flow.size
         self._discretised = Discretisation(self.angles, can_collocate((drive, last), (mechanism, other)))
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
-        of_drive = mechanism == other == family.operation(0.5 * (low + high))[0]
-        self._direction = family.direction(high, low, high) if of_drive else None
+        self._direction = family.direction(high, low, high) if mechanism is other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
         """Return the scale of each unknown, its typical magnitude: the larger of the scales at the two ends of the range."""

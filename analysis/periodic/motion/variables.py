@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,6 +171,15 @@ def format_value(name: str, value: float, unit: str) -> str:
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
 
+@lru_cache(maxsize=64)
+def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
+    """Return parameters with new values, given as (FMI name, value).
+
+    The result is cached, because all points in a row of a chart over the speed have the same values.
+    """
+    return replace(parameters, **dict(values))
+
+
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Return the mechanism and the drive with new values of parameters, which are given by FMI name."""
@@ -205,7 +214,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
         else:
             of_drive["motor"] = motor
     return (
-        replace(parameters, **of_mechanism) if of_mechanism else parameters,
+        _replace_parameters(parameters, *of_mechanism.items()) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
     )
 
