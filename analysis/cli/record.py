@@ -45,6 +45,7 @@ from .common import (
     "coefficient and the stiffness.",
 )
 @click.option("--friction", is_flag=True, help="Fit dry friction in addition to the damper.")
+@click.option("--least-swing", type=float, help="Smallest swing that is used, relative to the range; 0.1 by default.")
 @plot_option
 @out_option()
 @report_errors
@@ -61,7 +62,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
       linkwork decrement record.csv --time 't [s]' --position 'u [mm]' --unit mm --from '0.1 s' --friction
     """
     from ..files import read_record, write_csv
-    from ..numerics.decay import fit_decay
+    from ..numerics.decay import LEAST_SWING, fit_decay
 
     (heading, own), (t, x) = read_record(record, (time, position))
     _, _, second = _column_unit(heading, options["time_unit"], "--time-unit", ("s",))
@@ -70,7 +71,8 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     first = quantity(options["first"], "s", "--from") if options["first"] else -np.inf
     last = quantity(options["last"], "s", "--to") if options["last"] else np.inf
     kept = ~((t < first) | (t > last))
-    decay = fit_decay(t[kept], x[kept], friction=options["friction"])
+    least = LEAST_SWING if options["least_swing"] is None else options["least_swing"]
+    decay = fit_decay(t[kept], x[kept], friction=options["friction"], least_swing=least)
     si = _UNITS[kind or "m"]
     moving = None if options["mass"] is None else quantity(options["mass"], si[0], "--mass")
     if moving is not None and moving <= 0.0:
@@ -86,7 +88,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     say(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)")
     if not options["friction"]:
         with suppress(InputError):
-            dry = fit_decay(t[kept], x[kept], friction=True)
+            dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
             # more than noise and the approximation of the motion by parabolas can cause
             if dry.friction > 5.0 * dry.friction_error and dry.residual < 0.5 * decay.residual:
                 note(

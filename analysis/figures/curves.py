@@ -182,6 +182,7 @@ def drawn(describe: Callable[_Arguments, Picture]) -> Callable[_Arguments, style
     def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> style.Figure:
         return draw(describe(*arguments, **options))
 
+    plot_picture.__name__ = plot_picture.__qualname__ = describe.__name__.replace("describe", "plot", 1)
     return plot_picture
 
 
