@@ -12,7 +12,7 @@ from analysis.synthesis.search.fit import sum_of_squares
 from analysis.synthesis.search.program import make_start
 from analysis.synthesis.task.limits import make_limits
 from benchmarks.black_box import BlackBox, initial_simplex
-from tests.linkages import drawn, ellipse
+from tests.linkages import drawn, ellipse, scaled
 
 FloatArray = NDArray[np.float64]
 ELLIPSE = ellipse(18)
@@ -60,7 +60,7 @@ class TestQuality:
     def test_timed_it_is_that_of_the_exact_kernels(self, kind: str) -> None:
         black = box(self.tasks()[kind])
         # of a rocker function the ground link is given
-        linkage = self.KNOWN.scale(0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
+        linkage = scaled(self.KNOWN, 0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
         expected = sum_of_squares(black.normal, make_start(linkage, black.normal))
         x = unknowns(black, linkage)
         assert black.quality(np.vstack([x, x]))[1] == pytest.approx(expected, rel=1e-12)
@@ -86,7 +86,7 @@ class TestQuality:
         """One-sided, a point on the target would be perfect."""
         points = self.KNOWN.path(syn.turn(120))
         black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)))
-        tiny = self.KNOWN.scale(1e-3)
+        tiny = scaled(self.KNOWN, 1e-3)
         tiny = tiny.translate(points[3, 0] - tiny.path([0.0])[0, 0], points[3, 1] - tiny.path([0.0])[0, 1])
         assert black.quality(unknowns(black, tiny))[0] > 0.05 * black.normal.n
 

@@ -104,7 +104,7 @@ def test_origins_of_masses_and_lengths_that_leave_them():
 
 def test_masses_of_a_described_linkage_are_those_of_its_sections(tmp_path):
     rod = 'section = { kind = "rod", diameter = "12 mm", material = "steel" }'
-    text = linkages.TEXT.format(file="own.toml").replace('mass = "0.4 kg" ', f'mass = "0.4 kg"\n{rod}')
+    text = linkages.TEXT.replace("{file}", "own.toml").replace('mass = "0.4 kg" ', f'mass = "0.4 kg"\n{rod}')
     kept = [line for line in text.splitlines() if not line.startswith(("cog =", "inertia ="))]
     (tmp_path / "own.toml").write_text("\n".join(kept))
     origin = {mass.name: mass.origin for mass in load_case(tmp_path / "own.toml").masses}
