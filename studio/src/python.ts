@@ -34,15 +34,13 @@ export class WithPython {
   private readonly running = line(
     this.bar,
     this.doing,
-    button("Cancel", () => void this.cancel()),
+    button("Cancel", () => void this.server?.cancel()),
   );
   private readonly fault = make("p", { className: "fault", role: "alert" });
   private readonly answer = make("div", { "aria-live": "polite" });
   private begins: HTMLButtonElement[] = [];
   private wrong: HTMLElement | undefined;
   private busyWith = false;
-  /** The answer of the server to the last job that it was given. */
-  private given: Promise<Job> | undefined;
 
   constructor(
     place: HTMLElement,
@@ -126,20 +124,13 @@ export class WithPython {
     const request: Request = { mechanism, title, values, duration };
     this.answer.replaceChildren();
     this.busy({ state: "running", what: "starting" });
-    this.given = this.server!.give(kind, request, wanted);
-    const begun = await this.given;
+    const begun = await this.server!.give(kind, request, wanted);
     if (begun.state === "running") await this.follow(begun, true);
     else {
       this.end(begun);
       // it may be another tab's that is being done: here, too, it can be cancelled
       await this.resume();
     }
-  }
-
-  /** Cancel the job that is being done, also one that the server has not yet answered. */
-  private async cancel(): Promise<void> {
-    await this.given;
-    await this.server?.cancel();
   }
 
   /** Go on with a job that is being done: of another tab, or from before the page was opened anew. */

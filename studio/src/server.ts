@@ -72,12 +72,20 @@ export class Server {
     return new Server(token, mark.content.split(" "));
   }
 
-  async give(kind: string, state: Request, wanted: object): Promise<Job> {
-    return this.ask("POST", JSON.stringify({ kind, state, wanted }));
+  private given: Promise<Job> | undefined;
+
+  give(kind: string, state: Request, wanted: object): Promise<Job> {
+    this.given = this.ask("POST", JSON.stringify({ kind, state, wanted }));
+    return this.given;
   }
 
   look = (): Promise<Job> => this.ask("GET");
-  cancel = (): Promise<Job> => this.ask("DELETE");
+
+  /** Cancel the job that is being done, also one whose beginning the server has not yet answered. */
+  async cancel(): Promise<Job> {
+    await this.given;
+    return this.ask("DELETE");
+  }
 
   /** The end of a job that is being done; `told` hears of how it goes on. */
   async follow(begun: Job, told: (job: Job) => void): Promise<Job> {

@@ -188,9 +188,7 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
         at = given
         if isinstance(task, UntimedPath):
             # the crank rotations adapt to the changed dimension
-            assert normal.points is not None
-            ends = () if normal.closed or given is None else (float(given.min()), float(given.max()))
-            at = nearest_rotations(made, normal.places, *ends)
+            at = nearest_rotations(made, normal.places, *solution.traced_range())
         assert at is not None
         return _residuals(made, normal, at, isinstance(task, UntimedPath))
 

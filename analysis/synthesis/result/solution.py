@@ -354,12 +354,18 @@ class Solution(NotebookResult):
 
     def station_rotations(self) -> FloatArray:
         """Return the crank rotations of the task's stations; for a path without them, those at which the curve is nearest."""
-        normal, at = normal_form(self.task), self.evaluation.rotation
-        given = normal.rotation if normal.rotation is not None else at
+        normal = normal_form(self.task)
+        given = normal.rotation if normal.rotation is not None else self.evaluation.rotation
         if given is not None and len(given) == normal.n:
             return given
-        ends = () if at is None or normal.closed else (float(at.min()), float(at.max()))
-        return nearest_rotations(self.linkage, normal.places, *ends)
+        return nearest_rotations(self.linkage, normal.places, *self.traced_range())
+
+    def traced_range(self) -> tuple[float, float]:
+        """Return the crank rotations between which the linkage traces the path of an untimed task: a turn if it is closed."""
+        at = self.evaluation.rotation
+        if at is None or (isinstance(self.task, UntimedPath) and self.task.path.closed):
+            return 0.0, 2.0 * pi
+        return float(at.min()), float(at.max())
 
     def straight(self) -> StraightPart | None:
         """Return the straight part of the task as the linkage traces it; None if the task has none."""
@@ -409,8 +415,7 @@ class Solution(NotebookResult):
         at = self.evaluation.rotation
         if isinstance(task, UntimedPath):
             points = np.asarray(task.path.points)
-            begin, end = (0.0, 2.0 * pi) if task.path.closed or at is None else (float(at.min()), float(at.max()))
-            at = nearest_rotations(self.linkage, points @ np.array([1.0, 1j]), begin, end)
+            at = nearest_rotations(self.linkage, points @ np.array([1.0, 1j]), *self.traced_range())
         assert at is not None
         columns = {"crank rotation [rad]": at}
         if isinstance(task, RockerFunction):
