@@ -109,16 +109,13 @@ export class Charts {
   private kind: Source | "" = "";
   private mechanism!: Mechanism;
   private wanted: (chart: Table) => boolean = () => true;
+  private readonly widths = new ResizeObserver(() => {
+    for (const { plot } of this.charts)
+      plot.setSize({ width: Math.max(220, plot.root.parentElement!.clientWidth - 16), height: HEIGHT });
+  });
 
   constructor(private readonly place: HTMLElement) {
     document.head.append(make("style", { textContent: uplotStyle }));
-    new ResizeObserver(() => {
-      for (const { plot } of this.charts) plot.setSize({ width: this.width(), height: HEIGHT });
-    }).observe(place);
-  }
-
-  private width(): number {
-    return Math.max(220, this.place.clientWidth - 16);
   }
 
   /** Make those charts of a mechanism anew that are wanted; colours of text and grid are those of the page. */
@@ -127,6 +124,7 @@ export class Charts {
     this.wanted = wanted;
     this.kind = source;
     for (const { plot } of this.charts) plot.destroy();
+    this.widths.disconnect();
     this.place.replaceChildren();
     const axis = source === "steady" ? "crank angle [deg]" : "time [s]";
     this.charts = mechanism.charts.filter(wanted).map(({ title, unit, factor, curves }) => {
@@ -137,9 +135,10 @@ export class Charts {
       const looks = curves.map((curve, n) => look(called(curve), n));
       // its scale is known when it is drawn
       const hooks = { draw: [() => this.mark(this.row)] };
-      const plot = makePlot(box, axis, looks, { width: this.width(), hooks });
+      const plot = makePlot(box, axis, looks, { hooks });
       const line = make("div", { className: "now" });
       plot.over.append(line);
+      this.widths.observe(box);
       return { plot, line, curves, unit, factor };
     });
   }

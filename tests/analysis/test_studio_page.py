@@ -91,6 +91,19 @@ def test_no_digit_of_a_field_is_cut(page: Any) -> None:
 
 
 @in_browser
+@pytest.mark.parametrize("width", [420, 1366, 1920, 2560])
+def test_charts_fill_their_frames_at_any_width(page: Any, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 1000})
+    fits = """(one) => one.clientWidth - one.querySelector('.uplot').offsetWidth === 16"""
+    page.wait_for_function(f"[...document.querySelectorAll('#curves figure')].every({fits})", timeout=60_000)
+    across = page.evaluate("new Set([...document.querySelectorAll('#curves figure')].map((one) => one.offsetTop)).size")
+    assert across == (2 if width < 1500 else 1)
+    # the tabs above them are buttons of one line of text
+    heights = page.eval_on_selector_all("[role=tab]", "all => all.map((one) => one.offsetHeight)")
+    assert max(heights) < 40
+
+
+@in_browser
 def test_the_motion_that_is_shown_is_the_one_that_is_named(page: Any) -> None:
     named = "document.getElementById('source').selectedOptions[0].text"
     assert page.evaluate(named) == "periodic"
