@@ -44,10 +44,6 @@ class _Rows:
     unit: str
     curves: Mapping[str, FloatArray]
 
-    @property
-    def label(self) -> str:
-        return f"{self.name}\n[{self.unit}]"
-
 
 @plot.register
 @style.figure_style()
@@ -145,7 +141,7 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
         if 0.0 < _FAR * (top - bottom) < ends[1] - ends[0]:
             axis.set_ylim(bottom - (top - bottom), top + (top - bottom))
             notes.append(f"{name} is {ends[0]:.4g} to {ends[1]:.4g} {unit} in all runs, which is cut off.")
-        axis.set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
+        axis.set_ylabel(style.axis_label(name, unit))
     style.legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
@@ -168,7 +164,7 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
         return
     for number, (name, values) in enumerate(panel.curves.items()):
         draw_over_time(axis, time, values, label=name, line=style.LINES[number % len(style.LINES)])
-    axis.set_ylabel(panel.label)
+    axis.set_ylabel(style.axis_label(panel.name, panel.unit))
     if any(panel.curves):
         style.legend_above(axis)
 
@@ -320,7 +316,7 @@ def plot_comparison(
     for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
         for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
             axes[0].plot(time, values, line, color=colour, label=label)
-        axes[0].set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
+        axes[0].set_ylabel(style.axis_label(name, unit))
         if beside:
             _draw_difference(axes[1], time, b - a, unit, size)
     style.legend_above(rows[0, 0])

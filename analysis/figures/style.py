@@ -73,6 +73,12 @@ def name_in_words(name: str) -> str:
     return "crank speed" if name == "drive.speed" else name.replace(".", " ").replace("_", " ")
 
 
+def axis_label(name: str, unit: str) -> str:
+    """Return the label of a low axis: the name in words over its unit, long names in two lines."""
+    words = wrap(name_in_words(name), 22)
+    return "\n".join(words) + f"{' ' if len(words) > 1 else chr(10)}[{unit}]"
+
+
 def label_in_words(label: str) -> str:
     """Return an axis label, "name [unit]", with the name in words, see `name_in_words`."""
     name, bracket, unit = label.partition(" [")
