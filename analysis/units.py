@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from inspect import signature
-from math import inf, isfinite
+from math import inf, isfinite, tau
 from numbers import Real
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
@@ -91,7 +91,8 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     ------
     ParameterError
         If the value is neither a number nor a text, its unit is missing or has another dimension, or the number is not finite.
-        Hertz is refused for an angular speed, as a cycle is not a radian.
+        Hertz is refused for an angular speed, as a cycle is not a radian, and a number of more than one turn for an angle,
+        unless ``bare`` says its unit: it was probably meant in degrees.
     """
     spelled = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"
@@ -110,6 +111,9 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
             number = inf
         if bare is not None:
             number *= quantity(f"1 {bare}", unit, f"unit of {name}")
+        elif unit == "rad" and tau < abs(number) < inf:
+            kept = f'be at most one turn, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
+            raise ParameterError(name, value, kept)
     if not isfinite(number):
         raise ParameterError(name, value, "be a finite number")
     return number
@@ -145,9 +149,9 @@ def si(value: Any, unit: Units, name: str) -> Any:
     Raises
     ------
     ParameterError
-        As for `quantity`.
+        As for `quantity`, also for True and False.
     """
-    if isinstance(value, str):
+    if isinstance(value, (str, bool)):
         return quantity(value, unit, name) if isinstance(unit, str) else value
     if isinstance(value, Mapping):
         known = unit() if callable(unit) else unit

@@ -68,17 +68,6 @@ def _named_entries(reader: Any) -> Any:
 _PLACE = Many(coordinate, length=2)
 
 
-def angle(value: Any, name: str) -> float:
-    """Read an angle (rad); raise ParameterError for a number of four turns or more, which is probably in degrees."""
-    number = Quantity("rad")(value, name)
-    if not isinstance(value, str) and abs(number) >= 8.0 * pi:
-        requirement = (
-            f'be less than four turns, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
-        )
-        raise ParameterError(name, value, requirement)
-    return number
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
     """A moving body, described in its own coordinate frame.
@@ -130,7 +119,7 @@ class Line:
 
     on: str = entry(_name)
     through: str = entry(_name)
-    direction: float = entry(angle, 0.0)
+    direction: float = entry(Quantity("rad"), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +165,7 @@ class Gear:
 
     bodies: tuple[str, str] = entry(Many(_name, length=2))
     ratio: float = entry(Quantity("1"))
-    phase: float = entry(angle, 0.0)
+    phase: float = entry(Quantity("rad"), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -337,4 +326,4 @@ class Description:
     loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)
-    gravity_direction: float = entry(angle, -0.5 * pi)
+    gravity_direction: float = entry(Quantity("rad"), -0.5 * pi)

@@ -77,7 +77,7 @@ def expression(law: Law, about: bool, name: str) -> str:
     if isinstance(law, str):
         return ast.unparse(_WithoutBranches().visit(ast.parse(law, mode="eval")))
     units = ("rad", "N.m") if about else ("m", "N")
-    rows = [[quantity(value, unit, name) for value, unit in zip(row, units)] for row in law]
+    rows = [[quantity(value, unit, name, bare=unit) for value, unit in zip(row, units)] for row in law]
     return _table(rows, name)
 
 

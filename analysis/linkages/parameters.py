@@ -12,7 +12,7 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import BODY, GROUND, Body, Description, LinkageError, Spring, angle, is_given
+from .description import BODY, GROUND, Body, Description, LinkageError, Spring, is_given
 from .laws import is_periodic
 from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Slider, Structure
 
@@ -170,7 +170,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 turns,
                 f"{name}.{'angle' if turns else 'position'}",
                 f"{name}.{'speed' if turns else 'velocity'}",
-                (angle if turns else Quantity(unit))(table.start, f"{where}.start"),
+                Quantity(unit)(table.start, f"{where}.start"),
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
                 bool(inputs) and is_given(table.speed),
@@ -458,7 +458,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
     )
     for own, value, in_unit, text, rule, role in rows:
         if is_given(value):
-            reader = angle if in_unit == "rad" else Quantity(in_unit) if rule else Quantity(in_unit, least=0.0)
+            reader = Quantity(in_unit) if rule else Quantity(in_unit, least=0.0)
             number = reader(value, f"{where}.{own.removesuffix(f'_{kind}')}")
             yield Parameter(
                 f"{name}.{own}", in_unit, text, number, rule, role, of if role in ("stiffness", "damping") else ""

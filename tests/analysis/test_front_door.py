@@ -208,6 +208,7 @@ def test_a_range_is_in_the_unit_of_what_varies() -> None:
         (lambda: variant(FiveBarParameters, ground_length="1 m"), MissingParameterError, "is missing, and so are"),
         (lambda: variant(dict), InputError, "dict has no variants"),
         (lambda: force_turn("rahman-ideal", torque="3 N"), ParameterError, "torque is '3 N'"),
+        (lambda: simulate("table-3.1", stop_time=True), ParameterError, "stop_time is True: it must be a number in s"),
         (lambda: Tolerance("rod.length", half_width="1 deg"), ParameterError, "half width of rod.length is '1 deg'"),
     ],
 )
