@@ -61,12 +61,13 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
       linkwork decrement record.csv --mass '600 g'
       linkwork decrement record.csv --time 't [s]' --position 'u [mm]' --unit mm --from '0.1 s' --friction
     """
-    from ..files import read_record, write_csv
+    from ..files import note_assumed_units, read_record, write_csv
     from ..numerics.decay import LEAST_SWING, fit_decay
 
     (heading, own), (t, x) = read_record(record, (time, position))
     _, _, second = _column_unit(heading, options["time_unit"], "--time-unit", ("s",))
     unit, kind, size = _column_unit(own, options["unit"], "--unit", ("m", "rad"))
+    note_assumed_units(Path(record), (heading or options["time_unit"], own or options["unit"]), ("s", "m"))
     t = t * second
     first = quantity(options["first"], "s", "--from") if options["first"] else -np.inf
     last = quantity(options["last"], "s", "--to") if options["last"] else np.inf

@@ -11,6 +11,7 @@ from .drawings import save_figure as save_figure
 from .drawings import to_dxf as to_dxf
 from .drawings import to_svg as to_svg
 from .outputs import attribute_files as attribute_files
+from .outputs import note_assumed_units as note_assumed_units
 from .outputs import output as output
 from .outputs import write_text as write_text
 from .paths import WritingError as WritingError

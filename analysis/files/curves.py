@@ -14,6 +14,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
+from .outputs import note_assumed_units
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
 from .tables import NO_UNIT, SEPARATOR_LINE, heading_unit, units_below
@@ -103,6 +104,8 @@ def read_points(
         if scale is not None and scale != found:
             raise InputError(f"{path.name} is in {own} by its header line, which is not the unit {unit or units[0]}")
         scale = found
+    if scale is None:
+        note_assumed_units(path, ("", ""), (si, si))
     closed = len(rows) > 2 and bool((rows[0] == rows[-1]).all())
     return (1.0 if scale is None else scale) * (rows[:-1] if closed else rows), closed
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -33,15 +33,21 @@ class Writing:
         Whether the command may also overwrite other files.
     paths : dict of Path to Path
         Where each file was written: at its path, or beside a file that had to be kept.
+    assumed : dict of Path to str
+        What was assumed of each file that was read, for lack of a statement in it.
     """
 
     command: str
     force: bool = False
     paths: dict[Path, Path] = field(default_factory=dict)
+    assumed: dict[Path, str] = field(default_factory=dict)
 
     @property
     def notes(self) -> list[str]:
-        """A sentence on the files that had to be kept, if there are any."""
+        """Sentences on what was assumed of files, and on the files that had to be kept."""
+        return [f"{path.name}: {text}" for path, text in self.assumed.items()] + self._kept()
+
+    def _kept(self) -> list[str]:
         beside = {path: new for path, new in self.paths.items() if new != path}
         names = ", ".join(path.name for path in beside.values())
         wrote = f"since 'linkwork {self.command}' wrote"
@@ -67,6 +73,14 @@ def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
         yield writing
     finally:
         _CURRENT.reset(token)
+
+
+def note_assumed_units(path: Path, units: Sequence[str], si: Sequence[str]) -> None:
+    """Have the current command say which SI units were assumed for columns of a file that have no unit in their headings."""
+    missing = {place: kind for place, (unit, kind) in enumerate(zip(units, si), start=1) if not unit and kind != "1"}
+    if (writing := _CURRENT.get()) is not None and missing:
+        columns = " and ".join(f"column {place} in {kind}" for place, kind in missing.items())
+        writing.assumed[path] = f"no unit in the heading, so {columns} (a heading such as 'x [mm]' gives the unit)"
 
 
 @contextmanager

@@ -438,6 +438,7 @@ def _make_table(
     if len(columns) != 2:
         raise InputError(f"{path} has {len(columns)} columns: it must have two, time in s and value in {unit}")
     # the unit in a heading, else SI
+    files.note_assumed_units(path, found, ("s", unit))
     t, y = (
         column * (1.0 if own in ("", si) else quantity(f"1 {own}", si, f"{path.name}, column {place} in {own!r}"))
         for place, (column, own, si) in enumerate(zip(columns, found, ("s", unit)), start=1)

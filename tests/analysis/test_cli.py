@@ -160,6 +160,17 @@ def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, words, code
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(("heading", "said"), [("t,F", "column 1 in s and column 2 in N ("), ("t [ms],F [N]", "")])
+def test_units_that_a_file_of_inputs_does_not_state_are_said(linkwork, tmp_path, heading, said):
+    (tmp_path / "force.csv").write_text(f"{heading}\n0,0\n1,1\n")
+    table = 'force = { kind = "table", file = "force.csv" }\nrun.stop_time = "1 ms"'
+    (tmp_path / "case.toml").write_text(f'published = "table-3.1"\n{table}\n')
+    result = linkwork("run", "case.toml", "--no-plot")
+    assert result.exit_code == 0, result.stderr
+    assert ("force.csv: no unit in the heading" in result.stderr) == bool(said)
+    assert said in result.stderr
+
+
 @pytest.mark.parametrize("given", [["--set", "drive.speed=420"], ["case.toml"]])
 def test_a_bare_speed_under_which_a_run_ends_early_is_asked_about(linkwork, tmp_path, given):
     (tmp_path / "case.toml").write_text('published = "table-3.1"\n[drive]\nspeed = 420\n')

@@ -231,6 +231,7 @@ class TestCommand:
         (line,) = (line for line in output.splitlines() if "dry friction  " in line)
         assert float(line.split("│")[2]) == pytest.approx(1.0, rel=0.02)
         assert ("N.m.s/rad" in output) == bool(header)
+        assert "record.csv: no unit in the heading, so column 1 in s (" in " ".join(output.split())
 
     def test_friction_that_was_not_fitted_is_said(self) -> None:
         t = np.linspace(0.0, 0.8, 4001)
