@@ -68,7 +68,7 @@ def _faults_of_interface(m: Mechanism) -> Iterator[str]:
             ("level", ("position", "velocity", "all", "none")),
         ):
             if getattr(v, field) not in known:
-                yield f"{v.name} has the {field} {getattr(v, field)!r}: it must be {' or '.join(known)}"
+                yield f"{v.name} has {field} = {getattr(v, field)!r}: it must be {' or '.join(known)}"
         if v.rate_of and not {v.name, v.rate_of} <= set(m.output_names):
             yield f"{v.name} is the rate of {v.rate_of!r}: both must be real outputs"
     for v in m.variables:

@@ -11,7 +11,7 @@ import click
 import numpy as np
 from rich.table import Table
 
-from linkwork.errors import InputError, Interrupted
+from linkwork.errors import Interrupted
 
 from . import common
 from .design import leave_if_stopped, read_overrides, search_options, write_description_files, write_linkages
@@ -52,7 +52,7 @@ def slider_motion(
       linkwork slider-motion examples/slider-motion.toml --set slider.stroke='20 mm' --harmonics 3
       linkwork slider-motion examples/slider-motion.toml --objective worst
     """
-    from ..files import read_tables, write_csv
+    from ..files import write_csv
     from ..slider import load_slider_case
     from ..synthesis import SecondCrank, SliderMotion
 
@@ -60,10 +60,6 @@ def slider_motion(
         settings, slider__harmonics=harmonics, task__objective=objective, search__seed=seed, search__jobs=jobs
     )
     common.check_kind(case, common.SLIDER_MOTION, settings=overrides)
-    if "strategy" in {*read_tables(case), *(name.partition(".")[0] for name in overrides)}:
-        for option, value, entry in (("--harmonics", harmonics, "harmonics"), ("--objective", objective, "criterion")):
-            if value is not None:
-                raise InputError(f"{option} is not for a case with [strategy]: use --set strategy.{entry}={value!r}")
     chosen = load_slider_case(case, overrides)
     solution, stopped = _find_motion(chosen) if chosen.strategy is None else _find_strategy(chosen)
     folder = common.output_folder(out)

@@ -137,8 +137,11 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
 
 
 def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
-    """Return whether a force law about a pin repeats itself after every whole turn."""
-    if not isinstance(law, str):
+    """Return whether a force law about a pin repeats itself after every whole turn.
+
+    The angle x must stand in sin, cos and tan only, and the law have the same values one turn later.
+    """
+    if not isinstance(law, str) or _has_plain_angle(ast.parse(law, mode="eval")):
         return False
     names = vars(math) | {"abs": abs, "max": max, "min": min} | {name: value for name, (value, _) in known.items()}
     code = compile(law, "law", "eval")
@@ -149,6 +152,13 @@ def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
     except (ArithmeticError, ValueError, TypeError):
         return False
     return all(abs(b - a) <= 1e-9 * max(map(abs, turns[0])) for a, b in zip(*turns))
+
+
+def _has_plain_angle(node: ast.AST) -> bool:
+    """Return whether x stands outside of sin, cos and tan."""
+    if isinstance(node, ast.Call) and ast.unparse(node.func) in ("sin", "cos", "tan"):
+        return False
+    return (isinstance(node, ast.Name) and node.id == "x") or any(map(_has_plain_angle, ast.iter_child_nodes(node)))
 
 
 def with_constants(formula: str, known: Mapping[str, Any], prefix: str) -> str:

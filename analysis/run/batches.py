@@ -194,7 +194,7 @@ def _verdicts(task: Task, prepared: PreparedBatch, ends: NDArray[np.float64]) ->
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
             if code == k.NO_STEP:
-                message += run().describe_undefined_forces(x)
+                message += f": {run().describe_failed_step(x)}"
             stiff = run().stiffness_caution(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages

@@ -46,7 +46,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     values = [march.outputs(x, held) for _, x, held in rows]
     code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
     if march.status == k.NO_STEP:
-        message += run.describe_undefined_forces(march.good[1])
+        message += f": {run.describe_failed_step(march.good[1])}"
     table = np.array(values).reshape(-1, len(names))
     if not code:
         message = energy_balance(names, table, run.settings.tolerance)

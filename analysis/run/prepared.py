@@ -234,7 +234,7 @@ class Run:
             self.mechanism, self.settings, int(status[0]), t, x + turns.subtracted, self.limit, needed
         )
         if status[0] == k.NO_STEP:
-            message += self.describe_undefined_forces(x)
+            message += f": {self.describe_failed_step(x)}"
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance, twists(self.mechanism, times, values))))
@@ -262,11 +262,11 @@ class Run:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def describe_undefined_forces(self, x: NDArray[np.float64]) -> str:
-        """Return a text that names the springs whose law has no value just beyond the state x, or says that a mass is missing.
+    def describe_failed_step(self, x: NDArray[np.float64]) -> str:
+        """Return why no step succeeds at the state x: springs whose law has no value just beyond it, or a missing mass.
 
-        It is empty if neither is the case. The laws are evaluated at the positions 1 us and 1 ms after the state, extrapolated
-        with constant rates.
+        If neither is the case, the step size is told. The laws are evaluated at the positions 1 us and 1 ms after the state,
+        extrapolated with constant rates.
         """
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
@@ -280,10 +280,10 @@ class Run:
         lost = [spring for name, spring in springs.items() if not finite[name]]
         words = "law of {} has" if len(lost) == 1 else "laws of {} have"
         if lost:
-            return f": the {words.format(' and '.join(lost))} no value beyond"
+            return f"the {words.format(' and '.join(lost))} no value beyond"
         rates = [freedom.rate for freedom in self.mechanism.freedoms]
         moves = all(finite[v.name] for v in self.mechanism.variables if v.rate_of in rates)
-        return "" if moves else f": {MASSLESS}"
+        return "the step size fell below what the time can resolve" if moves else MASSLESS
 
     def _balance(self) -> tuple[int, int]:
         """Return the indices of the outputs for the energy balance residual and the kinetic energy."""
@@ -355,7 +355,7 @@ def verdict(
     if status == k.LIMIT:
         return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.describe_state(x.tolist())}"
     if status == k.NO_STEP:
-        return 4, f"the step size fell below what {at} can resolve, {mechanism.describe_state(x.tolist())}"
+        return 4, f"no step succeeds at {at}, {mechanism.describe_state(x.tolist())}"
     if status == k.RUNNING and needed:
         return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
     return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"

@@ -183,7 +183,9 @@ class SliderCase:
         for name, value in sorted(given):
             if name not in ("stroke", "links"):
                 raise ParameterError(
-                    f"slider.{name}", value, "not come with [strategy], which takes stroke and links alone"
+                    f"slider.{name}",
+                    value,
+                    "not come with [strategy], which takes stroke and links alone",
                 )
         if self.drive is None and any((self.load, self.tracking)):
             raise MissingParameterError("drive.speed")
@@ -457,6 +459,9 @@ def read_slider_case(
         raise MissingParameterError("slider")
     synthesis = syn.read_synthesis_case({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, syn.RockerFunction)
+    if "strategy" in data and "objective" in data["task"]:
+        wanted = "not come with [strategy], whose criterion says what is minimised"
+        raise ParameterError("task.objective", data["task"]["objective"], wanted)
     return files.read(
         SliderCase,
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},

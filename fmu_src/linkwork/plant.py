@@ -312,7 +312,7 @@ class Plant:
         except LinkworkError as error:
             raise self._explain(error, time, last) from error
         except UNDEFINED as error:
-            raise self._explain(IntegrationError(str(error)), time, last) from error
+            raise self._explain(IntegrationError(NO_ACCELERATION), time, last) from error
         self.state = result.x
         self.time = time + step
         self._step_size = result.step

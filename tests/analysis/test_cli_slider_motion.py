@@ -390,6 +390,10 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"strategy": {"tolerance": "1 mm", "criterion": "mean"}}, "strategy.criterion"),
         ({"strategy": {"tolerance": "1 mm", "ratios": [1.5]}}, "strategy.ratios"),
         ({"strategy": {"tolerance": "1 mm"}}, "slider.harmonics is (1,): it must not come with [strategy]"),
+        (
+            {"task": tables()["task"] | {"objective": "error"}, "slider": None, "strategy": {"tolerance": "1 mm"}},
+            "task.objective is 'error': it must not come with [strategy]",
+        ),
         ({"search": {"kinds": ["slider-crank"]}}, "search.kinds"),
         ({"search": {"gears": [2]}}, "gears"),
         ({"task": {"kind": "timed-path", "points": [[0, 0]]}}, "points"),

@@ -121,7 +121,7 @@ def test_what_was_followed_is_kept_when_a_branch_is_lost(compressor: Case, monke
         lost = respond(compressor, 0.2, greatest_step=0.3)
     assert len(lost.branches[0]) > 1
     assert lost.problems == (
-        f"the branch from crank.inertia = 0.2 kg.m2 is followed to crank.inertia = {lost.branches[0].parameter[-1]:.6g} kg.m2 "
+        f"the branch is followed from crank.inertia = 0.2 kg.m2 to crank.inertia = {lost.branches[0].parameter[-1]:.6g} kg.m2 "
         "only: no next point is found: no point there",
     )
     monkeypatch.setattr(Follower, "start", lose)

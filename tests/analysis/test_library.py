@@ -26,7 +26,7 @@ from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, rea
 from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
 from analysis.synthesis.result.output import description, drives
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import InputError, IntegrationError, LinkworkError
 from linkwork.limits import LIMIT_SINE, MASSLESS
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
@@ -261,7 +261,12 @@ def test_a_force_on_what_has_no_mass_is_named(tmp_path):
     )
     made = disc.freedom("disc", "A", speed=10.0).mechanism()
     given = made.first_set.parameters, Inputs(torque=1.0)
-    assert simulate(*given, stop_time=0.1).message.endswith(f": {MASSLESS}")
+    message = simulate(*given, stop_time=0.1).message
+    assert message == f"no step succeeds at t = 0 s, disc angle 0 rad (0.0000 deg): {MASSLESS}"
+    plant = Plant(made, given[0], made.first_set.initial, **{"drive.mode": 0})
+    plant.set_input("drive.torque", 1.0)
+    with pytest.raises(IntegrationError, match=f"in the step from t = 0 s: {MASSLESS}"):
+        plant.step(0.0, 0.1)
     for file in (build(made, tmp_path), build_native(made, NATIVE, tmp_path)):
         with pytest.raises(LinkworkError, match=re.escape(f", disc angle 0 rad (0.0000 deg): {MASSLESS}")):
             cosimulate(file, *given, stop_time=0.1)

@@ -705,6 +705,8 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
         find_orbit(replace(made.first_set.parameters, wind_n=2.5), speed=10.0)
     # where the law has no value at some angle it is none of them
     assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic_freedoms
+    # a stop beyond one and a half turns
+    assert not wheel("stopped", law="20*max(x - 9.5, 0) + sin(x)").mechanism().cyclic_freedoms
 
 
 def test_constants_of_a_law_keep_their_units() -> None:

@@ -20,6 +20,7 @@ from analysis.periodic import (
     Stability,
     boundary_gradient,
     confirm_form,
+    describe_end,
     find_orbit,
     find_orbits,
     follow,
@@ -172,6 +173,11 @@ def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: Branch) -
         # the multiplier passes 1 after the point that it names
         before, after = both.largest_multiplier[special.after : special.after + 2]
         assert min(before, after) < 1.0 < max(before, after)
+    # each end that was not reached is named
+    short = follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0, most_points=7)
+    low, high = (hardening.family.format_value(short.parameter[end]) for end in (0, -1))
+    assert describe_end(short).startswith(f"the branch is followed from {low} to {high} only: at {low} ")
+    assert f", at {high} " in describe_end(short)
 
 
 def test_the_arcs_of_duffing_end_at_its_folds(hardening: Branch) -> None:

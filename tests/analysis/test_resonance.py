@@ -67,7 +67,7 @@ def test_rig_1_spring_b_folds_and_doubles(response_b) -> None:  # type: ignore[n
     assert Crossing.PERIOD_DOUBLING in {s.kind for s in high.special}
     assert doubled.turns == 2
     # what ends early is told, with where
-    early = [problem for problem in response_b.problems if "is followed to drive.speed" in problem]
+    early = [problem for problem in response_b.problems if "is followed from drive.speed" in problem]
     assert len(early) == 3
     assert all("only:" in problem and "rpm" in problem for problem in early)
     assert all("twice the period" in problem for problem in response_b.problems if problem not in early)

@@ -320,6 +320,9 @@ def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: floa
         return up
     down = follow(family, orbit, value, low=low, high=high, direction=-1, **how)
     before = len(down) - 1
+    early = (
+        f"at {family.format_value(float(end.parameter[-1]))} {end.reason}" for end in (down, up) if not end.reached
+    )
     turned = [replace(special, after=before - 1 - special.after) for special in reversed(down.special)]
     return Branch(
         family=family,
@@ -329,7 +332,7 @@ def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: floa
         special=(*turned, *(replace(special, after=special.after + before) for special in up.special)),
         reached=down.reached and up.reached,
         closed=False,
-        reason=up.reason if down.reached else down.reason,
+        reason=", ".join(early),
         problems=(*down.problems, *up.problems),
     )
 
@@ -475,13 +478,13 @@ def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]
     return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / scale)
 
 
-def _test(point: Point, kind: Crossing, sign: float = 1.0) -> float:
+def _test_value(point: Point, kind: Crossing, sign: float = 1.0) -> float:
     """Return ``sign`` times a test function: for a fold the parameter's change along the branch, else `crossing_test`."""
     return sign * float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
 
 
-def _tests(points: Sequence[Point]) -> dict[Crossing, NDArray[np.float64]]:
-    """Return the values of all test functions at the points of a branch: see `_test`."""
+def _test_values(points: Sequence[Point]) -> dict[Crossing, NDArray[np.float64]]:
+    """Return the values of all test functions at the points of a branch: see `_test_value`."""
     matrices = np.array([point.data.monodromy for point in points])
     return {
         kind: np.array([p.tangent[-1] for p in points]) if kind is Crossing.FOLD else crossing_test(matrices, kind)
@@ -500,7 +503,7 @@ def _insert_dips(curve: Curve, follower: Follower) -> Curve:
     if len(steps) < 3:
         return curve
     inside, found = np.array(steps[1:-1]), dict[int, tuple[Point, float]]()
-    for kind, tested in _tests(points).items():
+    for kind, tested in _test_values(points).items():
         sign = np.sign(tested[1:-2])
         first, here, there, last = (sign * tested[k : len(inside) + k] for k in range(4))
         fall, rise = (here - first) / steps[:-2], (last - there) / steps[2:]
@@ -508,7 +511,7 @@ def _insert_dips(curve: Curve, follower: Follower) -> Curve:
         least = here * rise - fall * (there - rise * inside)
         clear = np.min([first, here, there, last], axis=0) > _AT_CROSSING
         for i in (np.flatnonzero(clear & (fall < 0.0) & (rise > 0.0) & (least < 0.0)) + 1).tolist():
-            test = partial(_test, kind=kind, sign=float(sign[i - 1]))
+            test = partial(_test_value, kind=kind, sign=float(sign[i - 1]))
             with suppress(ContinuationError):
                 dip, s, value = follower.minimise(points[i], steps[i], points[i + 1], test, -_AT_CROSSING)
                 if value < -_AT_CROSSING:
@@ -552,12 +555,12 @@ def _special_points(
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     problems: list[str] = []
-    values = _tests(curve.points)
+    values = _test_values(curve.points)
     for i, (before, after, length) in enumerate(zip(curve.points, curve.points[1:], curve.steps)):
         changed = {kind for kind, tested in values.items() if tested[i] * tested[i + 1] < 0.0}
         for kind, tested in _crossings(before, after, changed):
             try:
-                point, s = follower.locate(before, length, after, partial(_test, kind=tested))
+                point, s = follower.locate(before, length, after, partial(_test_value, kind=tested))
             except ContinuationError as error:
                 span = " and ".join(family.format_value(p.parameter) for p in (before, after))
                 problems.append(f"the {kind.value} between {span} is not located: {error}")

@@ -551,7 +551,7 @@ def describe_end(branch: Branch) -> str:
     """Return a sentence on a branch that was not followed to its end: how far it was followed, and why not further."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
-    return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
+    return f"the branch {period}is followed from {first} to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:

@@ -317,10 +317,13 @@ def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) 
     InputError
         If the curve has fewer than 2 points, or a coordinate is not finite.
     """
-    import shapely
+    from ...numerics.overlap import find_nearest
 
-    line = shapely.LineString(closed_vertices(plane_points(curve, "points of the curve", 2), closed))
-    return shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
+    line = np.ascontiguousarray(plane_points(curve, "points of the curve", 2).T)
+    places = np.ascontiguousarray(plane_points(points, "the points", 0).T)
+    distance, share = np.empty((2, places.shape[1]))
+    find_nearest(places, line, closed, distance, np.empty(len(distance), dtype=np.int64), share)
+    return distance
 
 
 def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:
