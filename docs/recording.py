@@ -19,7 +19,7 @@ from analysis.studio import make_page, page_state
 
 TARGET = Path(__file__).resolve().parent / "studio.webp"
 #: Width and height of the page (pixels), and scale of the animation relative to the page.
-WIDTH, HEIGHT, SHARE = 1000, 600, 0.8
+WIDTH, HEIGHT, SHARE = 1240, 890, 0.7
 #: Number of frames, and how long each is shown (ms).
 PICTURES, SHOWN = 40, 60
 
