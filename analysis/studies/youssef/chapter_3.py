@@ -414,8 +414,8 @@ def _torque_causes() -> list[Statement]:
             f"share of the slider's acceleration in {difference}",
             "more than half, as *due to* says",
             tuple(at_least(name, 0.5, x) for name, x in shares["acceleration"].items()),
-            "the difference comes from the terms with the squares of the velocities, because the slider is at another "
-            "position",
+            "the difference comes from the terms with squares and products of the velocities, because the slider has another "
+            "position and another velocity",
         ),
         Statement(
             "The independence of [the] torque of the stiffness k may be explained by the fact that the spring "

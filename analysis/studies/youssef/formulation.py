@@ -255,8 +255,8 @@ def compute() -> StudyResult:
     for label, run in found.items():
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
     return StudyResult(
-        claim="The multipliers are the pin forces. If all second derivatives are integrated at constant speed, the closure "
-        "of the loop shows the error of the integration.",
+        claim="The multipliers are the pin forces. If all second derivatives are integrated, the closure of the loop shows the "
+        "error of the integration.",
         assignment="The integrations are those of Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm (our choice), for "
         f"{STOP:g} s from u = u' = 0 in constant steps, at 420 rpm or in a launch from rest with T0 = 1e8 dyn.cm.",
         columns=columns,
@@ -277,12 +277,13 @@ def _closure_statements() -> list[Statement]:
         Statement(
             "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
             "closure.",
-            text("3.1, L1744-1748; the same in L1772-1782"),
+            text("3.1, L1744-1748; with L1772-1782"),
             "greatest failure of closure divided by the greatest error of u. All second derivatives are integrated by "
             "Hamming's method, at 420 rpm and in a launch. For *debugging*, the same at 420 rpm by Runge-Kutta's method "
             "with a slip that we put in: its last stage is at mid-step",
             "1 to 100, our choice: the closure must show the error, and must not be more than a hundred times as large",
             (*judge_closure(), Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0)),
+            "a large failure does show an error, as L1772-1782 says, since it is nowhere more than a hundred times as large",
         ),
         Statement(
             "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "

@@ -339,8 +339,9 @@ def soft_phase_plane() -> StudyResult:
             text("3.3, L2293-2297"),
             "higher harmonics of u (root of the sum of their squares) divided by the first harmonic, the least of the turns "
             "drawn. Then this ratio divided by the ratio that the equation linear in u gives for the same motion of the "
-            "crank, the greatest: *non-linear* is read as non-linear in u, since the sentence is about the slider and chapter "
-            "IV linearises in u (L2361); the sentence at L2253 is about the crank, whose inertia changes with its angle",
+            "crank, the greatest: *non-linear* is read as non-linear in u, since the sentence is about the slider and the "
+            "thesis linearises in u (L1248-1250); the sentence at L2253 is about the crank, whose inertia changes with its "
+            "angle",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (
@@ -445,9 +446,9 @@ def stiff_phase_plane() -> StudyResult:
                     about,
                     "rad/s",
                     why=(
-                        f"the ratio goes on growing down to {most:.0f} rad/s; with this damper, and forces that grow with the "
-                        f"square of the speed, that of a single mass is greatest at {one_mass:.0f} rad/s, not at half its "
-                        "natural frequency"
+                        f"the ratio goes on growing down to {most:.0f} rad/s. For a single mass with this damper, under "
+                        f"forces that grow with the square of the speed, it would be greatest at {one_mass:.0f} rad/s, not "
+                        "at half the natural frequency either"
                     ),
                 ),
             ),
@@ -481,7 +482,7 @@ def stiff_phase_plane() -> StudyResult:
             text("3.3, L2307-2317"),
             "natural frequency with the least effective mass of a turn, divided by that with the greatest, at u = 0; k = "
             "2e6 dyn/cm",
-            f"more than {ALIKE:g}, the rule for *the same*",
+            f"more than {1.0 + ALIKE:g}, the rule for *the same*",
             (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
         ),
     )

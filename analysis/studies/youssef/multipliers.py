@@ -218,8 +218,9 @@ def chapter_2_statements() -> tuple[Statement, ...]:
             text("2.2, eqs (2.11) to (2.21), L796-934"),
             "residual of each equation divided by its greatest term, with accelerations, force at C and crank torque by "
             "our equations of motion, at 25 crank angles; (2.13) and (2.14) at constant speed and under a torque. Table "
-            "3.1, with angles, speeds and forces of ours, so that no term is zero. (2.14) is read with the weight of "
-            "rocker and slider, which is illegible in the scan",
+            "3.1, with angles, speeds and forces of ours, so that no term is zero. Signs, squares and dots that the scan lacks "
+            "are read as in (2.15) to (2.19), (3.8) and (4.10) to (4.13), and the illegible weight in (2.14) as that of rocker "
+            "and slider",
             f"{ROUNDING:g}, above rounding errors",
             tuple(at_most(name, ROUNDING, x) for name, x in chapter_2_residuals().items()),
             "(2.20) has cos(theta4 + alpha) theta4'' where (2.15) has the sine",

@@ -184,7 +184,7 @@ def drift_result() -> StudyResult:
                 (none, *shapes),
             ),
             Statement(
-                "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0] (3.9) where [M] "
+                "The drift is linear with crank angle and may be described by the equation u=M. [theta2]+[u0] (3.9) where [M] "
                 "and [u0] are constants depending on [mu].",
                 text("3.2.1, L1911-1917"),
                 f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} (our choice), or until the "
