@@ -279,6 +279,13 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
     assert measured == pytest.approx(sorted([300.0, 50.0, 215.0, 215.0, 210.0]))
 
 
+def test_circles_of_dense_targets_leave_the_curve_to_be_seen() -> None:
+    dense = LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, 200))
+    circles = syn.drawing(syn.Solution.from_linkage(syn.TimedPath(points=dense), LINKAGE)).circles
+    covered = sum(2.0 * one.radius for one in circles if one.layer == "target")
+    assert 0.0 < covered < np.linalg.norm(np.diff(dense, axis=0), axis=1).sum()
+
+
 @pytest.mark.parametrize("point_angle", [-178.0, 0.0, 12.0])
 @pytest.mark.parametrize("rotation", [0.0, 1.0, 3.0])
 def test_numbers_of_dimensions_cover_neither_each_other_nor_other_dimensions(point_angle, rotation) -> None:

@@ -257,7 +257,9 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     if scene.target is not None and scene.target_closed is not None:
         polylines.append(Polyline(layer="target", points=scene.target, closed=scene.target_closed))
     elif scene.target is not None:
-        circles += [Circle(layer="target", centre=(x, y), radius=0.5 * radius) for x, y in scene.target.tolist()]
+        apart = np.linalg.norm(np.diff(scene.target, axis=0), axis=1)
+        small = min(0.5 * radius, 0.35 * float(np.median(apart)) or radius)  # dense targets do not hide the curve
+        circles += [Circle(layer="target", centre=(x, y), radius=small) for x, y in scene.target.tolist()]
     texts = [
         Text(layer="text", position=(x + 1.5 * radius, y + 1.5 * radius), height=height, text=name)
         for name, (x, y) in pins.items()
