@@ -91,7 +91,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     ------
     ParameterError
         If the value is neither a number nor a text, its unit is missing or has another dimension, or the number is not finite.
-        Hertz is refused for an angular speed, as a cycle is not a radian, and a number of more than one turn for an angle,
+        Hertz is refused for an angular speed, as a cycle is not a radian, and a number of four turns or more for an angle,
         unless ``bare`` says its unit: it was probably meant in degrees.
     """
     spelled = _PINT.get(unit, unit)
@@ -111,8 +111,8 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
             number = inf
         if bare is not None:
             number *= quantity(f"1 {bare}", unit, f"unit of {name}")
-        elif unit == "rad" and tau < abs(number) < inf:
-            kept = f'be at most one turn, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
+        elif unit == "rad" and 4.0 * tau <= abs(number) < inf:
+            kept = f'be less than four turns, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
             raise ParameterError(name, value, kept)
     if not isfinite(number):
         raise ParameterError(name, value, "be a finite number")
