@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.studies.statements import near
-from analysis.studies.youssef import search
+from analysis.studies.youssef import quality, search
 from analysis.studies.youssef.chapter_6 import best, straight_error
 from analysis.studies.youssef.packaging import TRAVEL_CM, straightest
 from analysis.studies.youssef.problems import PROBLEMS, pairing_area
@@ -140,6 +140,13 @@ def test_the_argument_of_the_root_is_that_of_assembly() -> None:
     reach = np.abs(l1 - l2 * np.exp(1j * turn(72)))
     closes = (reach <= l3 + l4) & (reach >= np.abs(l3 - l4))
     assert np.array_equal(assembly_arguments()[:200] >= 0.0, closes)
+
+
+def test_a_test_of_assembly_stops_at_its_first_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = np.ones((3, 72))
+    arguments[1, 0], arguments[2, 5] = -1.0, -1.0
+    monkeypatch.setattr(quality, "assembly_arguments", lambda: arguments)
+    assert quality.share_of_values() == (2 + 1 + 2) / (72 + 1 + 6)
 
 
 class TestSearch:

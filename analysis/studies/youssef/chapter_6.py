@@ -239,6 +239,7 @@ def _weighted() -> tuple[Statement, ...]:
 
 def _paths() -> tuple[Statement, ...]:
     ellipse_cm2 = pi * LONGER_CM * 5.0
+    as_printed = (PROBLEMS[name].linkage_error(PROBLEMS[name].printed) for name in ("path-a", "path-b"))
     return (
         Statement(
             "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
@@ -259,6 +260,7 @@ def _paths() -> tuple[Statement, ...]:
             f"184.443 cm for (b) (erratum 11), {ROUNDED}",
             f"0.05 cm2, {HALF}",
             (judge_stated_error("(a)", "2.3", "path-a", NO_DIGIT), judge_stated_error("(b)", "12.6", "path-b")),
+            "with the misprints the areas are {:.1f} and {:.1f} cm2".format(*as_printed),
         ),
     )
 

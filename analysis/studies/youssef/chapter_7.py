@@ -143,7 +143,7 @@ def family() -> StudyResult:
                 "of (7.14), minus U: the greatest size of each",
                 "1e-12 l3, for rounding errors, and 1e-6 l3 for U, which a square root gives",
                 (at_most("P off its arc", 1e-12, off_arc, "l3"), at_most("U deduced from P", 1e-6, off_slider, "l3")),
-                "once theta2 and U are given, P is one point of the arc",
+                "once theta2 and U are given, P is one point of the arc; the other root of (7.14) puts P at the same point",
             ),
         ),
     )

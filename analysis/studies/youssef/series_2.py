@@ -267,7 +267,7 @@ def _rocker() -> tuple[Statement, ...]:
             "equation (7.19) were considered.",
             text("7.3.2, L5969"),
             "error with the printed series, as above, relative to that with the pivot fixed. Then the least error with "
-            "three harmonics relative to that with two, with an unlimited stroke",
+            "three harmonics relative to that with two, with the slider at most l1 from the printed pivot (our choice)",
             f"0.15 for *enormous*, our choice, since 4.8 over 35.0 is 0.14; {fewer}",
             (
                 at_most("printed series", 0.15, raised, why="the printed series does not give the stated 4.8"),
