@@ -112,7 +112,9 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
         if bare is not None:
             number *= quantity(f"1 {bare}", unit, f"unit of {name}")
         elif unit == "rad" and 4.0 * tau <= abs(number) < inf:
-            kept = f'be less than four turns, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
+            kept = (
+                f'be less than four turns, or a text with its unit, such as "{value:g} deg": a number alone is in rad'
+            )
             raise ParameterError(name, value, kept)
     if not isfinite(number):
         raise ParameterError(name, value, "be a finite number")
