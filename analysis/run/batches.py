@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import prod
@@ -349,6 +349,23 @@ def prepare(task: Task) -> PreparedBatch:
         else:
             x[i], p[i, -1], scales[i] = start.x, start.energy, start.scale
     return PreparedBatch(encoded, batch._replace(p=p, scales=scales), x, failures)
+
+
+def hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
+    """Return hashes of the code on which results depend: equations, solver, users' functions."""
+    from ..numerics.codegen import fingerprint
+    from ..numerics.vectors import LANES
+    from . import compiled, lanes, on_device
+    from .equations import machine
+
+    kernels = (
+        compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows, on_device.run_thread, on_device.DeviceBatch,
+    )  # fmt: skip
+    switch, constants = mechanism.switch, varied_constants(mechanism, parameters)[1]
+    switched = bool(switch) and bool(np.any(getattr(constants, switch)))
+    ours = (machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES}))
+    compiled_code = (fingerprint(f) if f else "" for f in (*kernels, *functions))
+    return " ".join([*ours, Path(__file__).read_text(encoding="utf-8"), *compiled_code])
 
 
 def _is_switched_on(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:

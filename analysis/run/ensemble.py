@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 import mmap
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -27,15 +26,14 @@ from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import WorkersLost, check_jobs, record_interrupts, run_in_parallel, share_memory
 from ..units import Amount, in_si
 from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published
-from .batches import NOT_RUN, Result, Task, solve
-from .equations import machine
+from .batches import NOT_RUN, Result, Task, hash_code, solve
 from .events import show_progress
 from .inputs import Inputs, check_run, compile_source, encode
 from .prepared import compute_outputs
 from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, check_settings, sample_times
 from .trajectory import Trajectory
-from .varied import VariedSequence, distinct_objects, varied_constants
+from .varied import VariedSequence, distinct_objects
 from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
@@ -271,7 +269,7 @@ def simulate_many(
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # a multiple of 8 fills whole vectors
     batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
-    code = "" if where is None else _hash_code(mechanism, parameters, chain.from_iterable(encoded.functions))
+    code = "" if where is None else hash_code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(
             mechanism=mechanism,
@@ -378,22 +376,6 @@ class _Gathering:
         for array in self.samples:
             array[self._empty.counts == 0] = np.nan
         return replace(self._empty, messages=tuple(self.messages))
-
-
-def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
-    """Return hashes of the code on which results depend: equations, solver, users' functions."""
-    from ..numerics.codegen import fingerprint
-    from ..numerics.vectors import LANES
-    from . import batches, compiled, lanes, on_device
-
-    kernels = (
-        compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows, on_device.run_thread, on_device.DeviceBatch,
-    )  # fmt: skip
-    switch, constants = mechanism.switch, varied_constants(mechanism, parameters)[1]
-    switched = bool(switch) and bool(np.any(getattr(constants, switch)))
-    ours = (machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES}))
-    compiled_code = (fingerprint(f) if f else "" for f in (*kernels, *functions))
-    return " ".join([*ours, inspect.getsource(batches), *compiled_code])
 
 
 def _check_device(device: str | None, n_jobs: int | None, functions: bool) -> str | None:
