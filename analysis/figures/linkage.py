@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 from numpy.typing import ArrayLike, NDArray
-from shapely import MultiLineString
+from shapely import MultiLineString, Polygon
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
@@ -159,11 +159,13 @@ class _Scene:
         foot = np.array([0.0, -2.0 * unit])
         links = [(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p)]
         lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
+        ends = ((-1.5, -1.0), (1.5, -1.0), (1.5, 1.0), (-1.5, 1.0))
+        block = Polygon([self.point(q.u + s * unit, n * unit) for s, n in ends])
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
         for name, pin in pins.items():
             # of places with equal room one outside the loop is preferred
             outwards = 0.1 * (pin - centre) / max(hypot(*(pin - centre)), 1e-9)
-            best = roomiest_position(pin, 1.15 * unit, [lines], (*taken, *pins.values()), outwards)
+            best = roomiest_position(pin, 1.15 * unit, [lines, block], (*taken, *pins.values()), outwards)
             self._write(axis, best, name)
             taken.append(best)
         # the slider position

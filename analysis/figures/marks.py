@@ -37,6 +37,8 @@ _CLOSE = 0.3
 _CROSSED = 3
 #: Directions (rad) from a pin in which its letter may stand.
 _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
+#: Half the size of a letter, relative to its distance from its pin.
+_LETTER = 0.25
 
 
 def mark_place(axis: Axes, place: float, text: str) -> None:
@@ -246,15 +248,19 @@ def roomiest_position(
 ) -> FloatArray:
     """Return the position of a letter, at a distance ``reach`` from a pin, that is farthest from other shapes.
 
+    If there is no room for a letter at this distance, the position is farther from the pin.
     ``drawn`` are Shapely geometries. Distances from pins and other letters (``marks``) are multiplied by 0.6. Of positions with
     equal room the one in the direction ``away`` is preferred; the longer this vector, the greater its weight.
     """
     import shapely
 
-    places: FloatArray = pin + reach * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-    room = shapely.distance(shapely.GeometryCollection(list(drawn)), shapely.points(places))
-    for mark in marks:
-        room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
+    for far in (1.0, 1.4, 1.8):
+        places: FloatArray = pin + far * reach * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+        room = shapely.distance(shapely.GeometryCollection(list(drawn)), shapely.points(places))
+        for mark in marks:
+            room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
+        if room.max() >= _LETTER * reach:
+            break
     if away is not None:
         room = room + (places - pin) @ away
     return places[int(np.argmax(room))]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Path2D
 from matplotlib.text import Text
@@ -18,7 +19,7 @@ from matplotlib.transforms import Bbox
 from PIL import Image
 
 from analysis import Inputs, figures, simulate, simulate_many
-from analysis.figures import Curve, Panel, scheme
+from analysis.figures import Curve, Panel, scheme, style
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
 from analysis.figures.style import GROUND
@@ -411,9 +412,20 @@ def test_an_oscillation_too_fast_to_be_drawn_is_a_band_with_its_mean(run) -> Non
     assert "Band" not in figures.plot(fast, ["crank.angle"]).get_supxlabel()
 
 
-def test_letters_of_a_described_linkage_cover_no_line() -> None:
+@pytest.mark.parametrize("name", ["watt-1", "elastic-bearing"])
+def test_letters_of_a_described_linkage_cover_no_line_and_no_block(name: str) -> None:
     from analysis.linkages import load_linkage
 
-    axis = figures.plot(load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / "watt-1.toml")).axes[0]
-    assert len(axis.texts) > 5
-    stand_clear(axis, [text.get_window_extent() for text in axis.texts])
+    axis = figures.plot(load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / f"{name}.toml")).axes[0]
+    assert len(axis.texts) > 4
+    boxes = [text.get_window_extent() for text in axis.texts]
+    stand_clear(axis, boxes)
+    blocks = [patch.get_window_extent() for patch in axis.patches if patch.get_facecolor() == to_rgba(style.BLOCK)]
+    assert len(blocks) == (2 if name == "elastic-bearing" else 0)
+    assert not any(block.overlaps(box) for block in blocks for box in boxes)
+
+
+def test_only_the_letter_of_its_pin_stands_on_the_block_of_a_five_bar() -> None:
+    axis = figures.plot(replace(WITH_POINT, rocker_length=0.02), 5.0, 0.02).axes[0]
+    (block,) = (p.get_window_extent() for p in axis.patches if p.get_facecolor() == to_rgba(style.BLOCK))
+    assert [text.get_text() for text in axis.texts if text.get_window_extent().overlaps(block)] == ["D"]
