@@ -32,14 +32,14 @@ class MissingLibraryError(LinkworkError, ImportError):
 
 
 def require(*libraries: str) -> None:
-    """Check that libraries are installed, without importing them.
+    """Check that libraries, or those of modules such as ``lxml.etree``, are installed, without importing them.
 
     Raises
     ------
     MissingLibraryError
         For the first library that is not installed.
     """
-    for library in libraries:
+    for library in (name.partition(".")[0] for name in libraries):
         if find_spec(library) is None:
             raise MissingLibraryError(library)
 

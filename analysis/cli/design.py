@@ -13,9 +13,11 @@ import click
 from linkwork.errors import Interrupted
 
 from ..display import format_count
+from ..libraries import MissingLibraryError
 from . import common
 
 if TYPE_CHECKING:
+    from ..files import Drawing
     from ..synthesis import Assessment, MachineSpec, PinForces, Solution, TradeOff
 
 #: Number of further positions of the linkage that a drawing shows.
@@ -116,13 +118,25 @@ def write_description_files(
 
     ``curve``, ``text`` and ``drawn`` are the names of the files without ending; ``title`` is the title in report and drawing.
     """
-    from ..files import save_drawing, write_text
+    from ..files import write_text
     from ..synthesis import drawing
 
     described = write_text(folder / f"{text}.txt", f"{title}\n\n{best.report}")
     written = [best.solution.to_csv(folder / f"{curve}.csv"), described]
     picture = drawing(best.solution, poses=POSES, title=title)
-    return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
+    return written + _save_drawing(picture, folder / drawn)
+
+
+def _save_drawing(picture: Drawing, path: Path) -> list[Path]:
+    """Write a drawing as DXF and SVG, and return the paths; ``path`` is without ending. Without ezdxf, write SVG and a note."""
+    from ..files import save_drawing
+
+    written = [save_drawing(f"{path}.svg", picture)]
+    try:
+        return [save_drawing(f"{path}.dxf", picture), *written]
+    except MissingLibraryError as error:
+        common.note(f"{path}.dxf was not written: {error}")
+        return written
 
 
 def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: MachineSpec) -> list[Path]:
@@ -143,7 +157,7 @@ def write_solution(
 ) -> list[Path]:
     """Write all files of one solution: drawings, plates, curve, report, parameters, case of a run, plots; return the paths."""
     from .. import figures
-    from ..files import save_drawing, save_figure, write_tables
+    from ..files import save_figure, write_tables
     from ..run import save_parameters
     from ..synthesis import plates, run_case
 
@@ -158,7 +172,7 @@ def write_solution(
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
         written.append(write_tables(case, run_case(solution, make, title), head=make.describe_masses()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
-    written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
+    written += _save_drawing(cut, folder / "best-plates")
     written += common.save_plot(plot, solution, folder / "best-linkage.png", title=title)
     if plot:
         forces = _forces(solution, make)

@@ -174,15 +174,17 @@ def fit_decay(
             )
         )
 
-    def fit(jumps: ArrayLike) -> Decay:
+    places, reach = range(len(turns)), half * _WINDOW
+    found = _fit(np.array([_turning_point(t, x, turn, reach) for turn in turns]), friction)
+    for _ in range(_ROUNDS if friction else 1):
+        # read at evenly spaced times: noise moves the vertex of a parabola outwards, which would lessen the decrement
+        line = np.polyval(np.polyfit(places, found.time, 1, w=np.abs(found.fitted - found.offset)), places)
+        jumps = np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0)
         tops = [
-            _vertex(t, x, turn, half * _WINDOW, jump) for turn, jump in zip(turns, np.broadcast_to(jumps, len(turns)))
+            (_turning_point(t, x, turn, reach, jump)[0], _turning_point(t, x, turn, reach, jump, time)[1])
+            for turn, jump, time in zip(turns, jumps, line)
         ]
-        return _fit(np.array(tops), friction)
-
-    found = fit(0.0)
-    for _ in range(_ROUNDS if friction else 0):
-        found = fit(np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0))
+        found = _fit(np.array(tops), friction)
     return found
 
 
@@ -221,24 +223,32 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
     return found
 
 
-def _vertex(
-    t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float, jump: float
+def _turning_point(
+    t: NDArray[np.float64],
+    x: NDArray[np.float64],
+    turn: int,
+    reach: float,
+    jump: float = 0.0,
+    time: float | None = None,
 ) -> tuple[float, float]:
-    """Return the vertex (time, position) of a parabola fitted to the samples within ``reach`` of a turning point.
+    """Return time and position of the vertex of a parabola fitted to the samples within ``reach`` of a turning point.
 
     The parabola is fitted to at least three samples. Its curvature is the mean curvature times (1 + ``jump``) before the
-    vertex, and times (1 - ``jump``) after it.
+    vertex, and times (1 - ``jump``) after it. If the ``time`` of the turning point is known, return the position at this time.
     """
-    first, last = np.searchsorted(t, (t[turn] - reach, t[turn] + reach))
+    if time is not None:
+        turn = int(np.clip(np.abs(t - time).argmin(), 1, len(t) - 2))
+    middle, scale = t[turn] if time is None else time, t[turn + 1] - t[turn - 1]
+    first, last = np.searchsorted(t, (middle - reach, middle + reach))
     near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
-    middle, scale = t[turn], t[turn + 1] - t[turn - 1]
     width, place, height = reach / scale + 1.0, 0.0, 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if time is None else 1):
         s = (t[near] - middle) / scale - place
         columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
         a, b, height = np.linalg.lstsq(columns, x[near], rcond=None)[0].tolist()
-        step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
-        place, height = place + step, height + (a * step + b) * step
+        if time is None:
+            step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
+            place, height = place + step, height + (a * step + b) * step
     return middle + scale * place, height
 
 

@@ -70,7 +70,11 @@ run = simulate("table-3.1", stop_time="20 ms")
 figures.plot(run).savefig("run.png")
 figures.plot(find_orbit("table-3.1")).savefig("orbit.png")
 linearise("table-3.1", [0.0, 0.0, 0.0, 0.0])
-for words in (["run", "--published", "table-3.1", "--stop-time", "20 ms"], ["build", "FiveBarSlider", "--kinds", "python"]):
+for words in (
+    ["run", "--published", "table-3.1", "--stop-time", "20 ms"],
+    ["build", "FiveBarSlider", "--kinds", "python"],
+    ["exact", {case!r}],
+):
     try:
         main(words)
     except SystemExit as ended:
@@ -85,8 +89,11 @@ def run_without(missing: set[str], program: str, folder: Path) -> str:
 
 
 def test_the_core_alone_builds_runs_checks_and_plots(fmu: Path, tmp_path: Path) -> None:
-    printed = run_without(set().union(*EXTRAS.values()), CORE_ALONE.format(fmu=str(fmu)), tmp_path)
+    program = CORE_ALONE.format(fmu=str(fmu), case=str(ROOT / "examples" / "five-poses.toml"))
+    printed = run_without(set().union(*EXTRAS.values()), program, tmp_path)
     assert "FiveBarSlider.fmu: valid" in printed
+    # without ezdxf a drawing is SVG only
+    assert [path.name for path in (tmp_path / "out").glob("best.*")] == ["best.svg"]
 
 
 #: What needs a library of an extra.
@@ -100,6 +107,7 @@ NEEDING = {
     "anywidget": "import analysis.studio.widget",
     "wasmtime": "from analysis.export.component import component; component(b'')",
     "distributed": "from analysis.libraries import require; require('dask', 'distributed')",
+    "pyssp-standard": "from analysis.systems.ssp import ssd; ssd.SSD",
 }
 
 
