@@ -46,7 +46,7 @@ SPEEDS = np.unique(
     np.concatenate([np.arange(9.0, 40.05, 0.1), np.arange(15.0, 15.8, 0.005), np.arange(30.0, 31.3, 0.005)]).round(3)
 )
 #: Mask of the speeds outside the regions of resonance.
-APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
+APART = (np.abs(SPEEDS - 15.5) >= 1.0) & (np.abs(SPEEDS - 31.0) >= 2.0)
 #: omega_c = mu/(m4 + m5) (1/s) of appendix 2: it raises mu by 200 dyn.s/cm after each curve, and m4 + m5 is 1000 g.
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
 #: omega_c (1/s) at which second harmonics are compared: the thesis's value, which removes all instability.
@@ -149,7 +149,7 @@ def judge_growth(n: int) -> list[Case]:
     curves = [columns[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
-    speeds = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
+    speeds = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.002)
     widths = [range_above(level, speeds, harmonic(n, speeds, ratio)) for ratio in INERTIA_RATIOS]
     return [
         at_least(f"{word} harmonic outside the resonances", 1.0, min(ratios)),
@@ -204,7 +204,7 @@ def compute_first() -> StudyResult:
                         )
                         for ratio in sorted(DAMPED_RATIOS)
                     ),
-                    Case(label="third ratio", computed=None, why="the text does not name the third ratio"),
+                    Case(label="third ratio", computed=None, why="the text names no ratio for this figure"),
                 ),
                 f"at 1.5, our choice, the distance would be {below[1.5]:.2f} rad/s",
             ),
@@ -231,9 +231,9 @@ def compute_first() -> StudyResult:
                 "THIS[ ]PROG. I[N]VISTIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
                 listing("appendix 2, L8398"),
                 "*investigates* is read as finds right: speed and height of the peak of the first harmonic, and height of "
-                f"the peak of the second, by the listing and by the right equation. omega_c = {DAMPERS[0]:g} 1/s is the "
-                "listing's first damper; I4 = 1 is the listing's, and 0.5 that of Fig 4.7",
-                f"{HALF_STEP:g} rad/s, half the listing's step in speed; {ABOUT:g} of the amplitude, the rule for *about*",
+                "the peak of the second, by the listing, but between its steps in speed, and by the right equation. omega_c = "
+                f"{DAMPERS[0]:g} 1/s is the listing's first damper; I4 = 1 is the listing's, and 0.5 that of Fig 4.7",
+                f"{HALF_STEP:g} rad/s, half a step of the listing; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "the force of the listing lacks most of its second harmonic (erratum 21)",
             ),
@@ -282,7 +282,7 @@ def compute_second() -> StudyResult:
                 text("4.5.1, L3162-3168; the same in L3210-3214"),
                 "second harmonic, and greatest of the third to the tenth (*higher*, L3212), divided by the first: the "
                 "greatest values of each, and the values at the same speed. The largest ratio of the three I4 from 9 to 40 "
-                f"rad/s (our choice) is listed, by the right equation with omega_c = {COMPARED_AT:g} 1/s, the value of "
+                f"rad/s (as in appendix 2) is listed, by the right equation with omega_c = {COMPARED_AT:g} 1/s, the value of "
                 "5.3.2; without a damper the resonances have no bound",
                 f"1, since the *dominant* harmonic is the greater; {SMALL:g}, the rule for *negligible*",
                 (
@@ -471,7 +471,7 @@ def _curves() -> tuple[Statement, ...]:
     return (
         Statement(
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
-            text("4.5.2, L3176-3178; the same in L3203-3204"),
+            text("4.5.2, L3176-3178; the same in L3203-3206"),
             f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, relative to the peak at "
             f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s (our choice) from "
             "the peaks. The second harmonic is included, since L3203 speaks of *the solution*",

@@ -251,7 +251,8 @@ def compute() -> StudyResult:
         assignment="The right linear equation is (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F. It is the "
         "equation of the mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta). M, K and F "
         "have the period of the crank; lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = "
-        "omega_c/omega and omega_c = mu/(m4 + m5).",
+        "omega_c/omega and omega_c = mu/(m4 + m5). Unless a row says otherwise, (4.21) and (4.29) as printed are "
+        "evaluated at the angles of the listings, alpha = 149, alpha3 = 57 and alpha4 = 120 deg.",
         columns=columns,
         statements=(_small_motion(), *_kinematics(), *_equation(), *_simplification(), *_balance()),
     )
@@ -295,8 +296,8 @@ def _kinematics() -> list[Statement]:
             "The angles [alpha] and [alpha3] are then calculated accordingly.",
             text("4.1, eqs (4.1), (4.6), L2404-2417; (4.6) at L2452-2458"),
             "datum by (4.1) and (4.6), compared with ALF, ALF3, ALF4 of appendices 2 to 4 (L8404; 120.99. is read as "
-            "120.,9.), for sigma2 = 0.05, sigma3 = 1 and sigma = 1, which the thesis does not state but which give its "
-            "angles",
+            "120.,9.), for sigma2 = 0.05, sigma3 = 1 and a ground link as long as the rocker, sigma = 1, which the thesis "
+            "does not state",
             "half a degree, since the listings have whole degrees",
             tuple(
                 near(
@@ -369,11 +370,12 @@ def _simplification() -> list[Statement]:
     left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
     return [
         Statement(
-            "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
+            "The coefficients B1, C1, H1, P1, [...], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
             "least a factor [...] in the worst cases.",
             text("4.3, L2797-2801"),
-            why="the factor cannot be read, and without it *much smaller* has no measure. With the conditions of 4.5 and I4 = "
-            f"1 the greatest of the coefficients as printed, E1, is {greatest_varying_part():.2f} of A1",
+            why="the fifth coefficient and the factor cannot be read, and without the factor *much smaller* has no measure. "
+            "With the conditions of 4.5 and I4 = 1 the greatest of the coefficients as printed, E1, is "
+            f"{greatest_varying_part():.2f} of A1",
         ),
         Statement(
             "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
