@@ -238,8 +238,8 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
             "greatest omega_c that is needed to remove the region, over sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01, "
-            "and over sigma3 = 0.8 to 1.2 in steps of 0.025; estimated from the width without a damper by the right linear "
-            "equation",
+            "and over sigma3 = 0.8 to 1.2 in steps of 0.025; estimated to 1.5 % from the width without a damper by the right "
+            "linear equation",
             "none: the region is removed or it is not",
             (
                 at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
