@@ -153,6 +153,13 @@ class TestGoals:
         assert area(path_motion(harmonics).linkage) == pytest.approx(error, abs=0.03)
         assert slider(path_motion(harmonics).linkage).series.order == harmonics
 
+    def test_a_stroke_beyond_the_limit_reaches_less(self) -> None:
+        series = FourierSeries(np.array([1.005, 15.748, -2.555]) / 100.0, np.array([0.0, 27.293, 1.024]) / 100.0)
+        longer = replace(PROBLEMS[PATH].linkage, pivot=SliderMotion(series, 0.163))
+        assert slider(longer).stroke > PATH_SEARCHES[2][1]
+        assert area(longer) < linkage_error(PATH, path_motion(2).linkage) / 1.1
+        assert area(longer) == pytest.approx(linkage_error(PATH, longer), abs=0.03)
+
     def test_the_links_are_the_printed_ones(self) -> None:
         for name, motions in (
             (ROCKER, [rocker_motion(n) for n in (1, 2, 3)]),

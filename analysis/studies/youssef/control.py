@@ -38,7 +38,16 @@ from .chapter_7 import slider
 from .problems import PROBLEMS
 from .runs import SPEED as TURN_RPM
 from .runs import steady_turn, table_3_1
-from .series_2 import PATH, ROCKER, linkage_error, mended_path_linkage, path_motion, readings, rocker_motion
+from .series_2 import (
+    PATH,
+    PATH_SEARCHES,
+    ROCKER,
+    linkage_error,
+    mended_path_linkage,
+    path_motion,
+    readings,
+    rocker_motion,
+)
 
 #: Crank speed (rad/s).
 SPEED = 4.0 * pi
@@ -263,8 +272,8 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
             "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
             text("7.1.1 (b), L5311-5319"),
-            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm at 420 rpm. Only spring, "
-            "damper and the forces of the links move the slider",
+            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 rpm. "
+            "Only spring, damper and the forces of the links move the slider",
             f"more than {READ:g}, the accuracy to which a graph can be read",
             (
                 at_least("spring, continuous", READ, spring_range()),
@@ -393,9 +402,10 @@ def judge_strategy() -> tuple[Statement, ...]:
             "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
             "five bar loop.",
             text("7.4, L6013"),
-            "error with the slider moved by its best two harmonics, relative to that with the pivot fixed, for the printed "
-            "links, mended. Our example of another link is a second crank, geared to the first (L6017), which moves the rocker "
-            "pivot on a circle about its printed place; we take the best length, phase and gear ratio of 1, -1, 2 and -2",
+            "error with the slider moved by its best two harmonics within the limits of the next row, relative to that with "
+            "the pivot fixed, for the printed links, mended. Our example of another link is a second crank, geared to the first "
+            "(L6017), which moves the rocker pivot on a circle about its printed place; we take the best length, phase and gear "
+            "ratio of 1, -1, 2 and -2",
             SEEN_FALL,
             (
                 at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
@@ -410,12 +420,14 @@ def judge_strategy() -> tuple[Statement, ...]:
             text("7.4, L6026"),
             "*optimum* is read as the least error that we find. Error of the printed four-bars, mended, relative to it, as at "
             "L7026; error with the two printed series, as at L5935, relative to the least with as many harmonics and the same "
-            "links",
+            "links. At Fig 7.11 the slider stays within l1 of the printed pivot; at Fig 7.12 its stroke is at most "
+            f"{CM_PER_METRE * PATH_SEARCHES[2][1]:g} cm, ten times the printed one (our limits)",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
             (
                 *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),
                 Case(label="a fifth link, further inputs", computed=None, why="no example is given"),
             ),
+            "with still longer strokes, the printed series of Fig 7.12 is no optimum either",
         ),
     )
 

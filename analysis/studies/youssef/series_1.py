@@ -258,8 +258,8 @@ def _positions() -> tuple[Statement, ...]:
             "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
             text("7.3.1, L5685"),
             f"at the {standing.size} points where (7.14) has no real root: share of upright rockers, sin th4 > {UPRIGHT:g}, "
-            "at the least error. Then the greatest difference between the error with U by (7.15) and the least error of the "
-            "slider positions above",
+            "at the least error. Then the greatest difference between the error with the better U of (7.15) and the least "
+            "error of the slider positions above",
             f"none for the share, as *must surely be* says; {fine.format(moved[missing].max())}",
             (
                 near(f"upright, the {lines[0]}", 1.0, standing[above].mean(), 0.0),
@@ -272,7 +272,7 @@ def _positions() -> tuple[Statement, ...]:
             "argue the philosophy behind the use of any other method.",
             text("7.3.1, L5772-5776"),
             "share of the points at which U gives the least error of the slider positions above. U is solved once by "
-            "(7.14), or by (7.15) where (7.14) has no real root",
+            "(7.14), or is the better U of (7.15) where (7.14) has no real root",
             f"{fine.format(moved.max())}; none for the share",
             (
                 at_least(f"(7.14), {off.size} points", 1.0, np.mean(off <= 1e-3)),

@@ -83,7 +83,8 @@ def rocker_motion(harmonics: int) -> Solution:
 def path_motion(harmonics: int) -> Solution:
     """Return the best slider motion with a number of harmonics for path (b), with the printed links.
 
-    Bounds on the guide's angle, 0 to 90 deg from the ground link, and on the stroke lead the search to the better optima.
+    The guide is turned by 0 to 90 deg from the ground link. With two harmonics, longer strokes than the limit, more than ten
+    times the printed one, reach less.
     """
     p = PROBLEMS[PATH]
     starts, stroke = PATH_SEARCHES[harmonics]
@@ -416,8 +417,8 @@ def _path() -> tuple[Statement, ...]:
             "suitable control of U than could otherwise be obtained.",
             text("7.0, L5248"),
             "area that P reaches relative to that within the envelope, for the three limits of U of L5242, Fig 7.2 (our "
-            "choice). Then the area between path and curve with our best motion of two harmonics, relative to that with the "
-            "pivot fixed, as at L5935: we read *otherwise* as with the same links",
+            "choice). Then the area between path and curve with two harmonics of the slider, found as at L5935, relative to "
+            "that with the pivot fixed: we read *otherwise* as with the same links",
             f"1 %, as at Fig 7.2; {SEEN_FALL}",
             (
                 *(
