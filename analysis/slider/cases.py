@@ -178,15 +178,6 @@ class SliderCase:
             raise ParameterError(
                 f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
             )
-        # a search for the simplest mechanism has its own numbers of harmonics and starts
-        given = asdict(self.slider).items() - asdict(SliderTable()).items() if self.strategy is not None else ()
-        for name, value in sorted(given):
-            if name not in ("stroke", "links"):
-                raise ParameterError(
-                    f"slider.{name}",
-                    value,
-                    "not come with [strategy], which takes stroke and links alone",
-                )
         if self.drive is None and any((self.load, self.tracking)):
             raise MissingParameterError("drive.speed")
 
@@ -459,10 +450,7 @@ def read_slider_case(
         raise MissingParameterError("slider")
     synthesis = syn.read_synthesis_case({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, syn.RockerFunction)
-    if "strategy" in data and "objective" in data["task"]:
-        wanted = "not come with [strategy], whose criterion says what is minimised"
-        raise ParameterError("task.objective", data["task"]["objective"], wanted)
-    return files.read(
+    made: SliderCase = files.read(
         SliderCase,
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
@@ -471,6 +459,13 @@ def read_slider_case(
             "strategy": partial(_read_strategy, angular=angular),
         },
     )
+    if made.strategy is not None:
+        given = {f"slider.{name}": v for name, v in data.get("slider", {}).items() if name not in ("stroke", "links")}
+        given |= {f"task.{name}": v for name, v in data["task"].items() if name == "objective"}
+        for name, value in given.items():
+            wanted = "not come with [strategy], which takes stroke and links alone and has a criterion of its own"
+            raise ParameterError(name, value, wanted)
+    return made
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> syn.Linkage:

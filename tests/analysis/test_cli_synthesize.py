@@ -311,7 +311,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE + '[bounds]\ncrank_length = ["1 deg", "2 deg"]', "it must be a number in m"),
         (ELLIPSE + "[bounds]\ncrank_length = [1]", "[least, greatest]"),
         (ELLIPSE + '[bounds]\nground_length = "3 m"\n[constraints]\nlargest_link = "1 m"', "no linkage has both"),
-        (ELLIPSE + "[constraints]\nleast_transmission_angle = 40", "a number without a unit is in rad"),
+        (ELLIPSE + "[constraints]\nleast_transmission_angle = 40", 'such as "40 deg": a number alone is in rad'),
         (ELLIPSE + '[constraints]\ngrashof = "crank-roker"', "did you mean crank-rocker?"),
         (ELLIPSE + '[constraints]\ngrashof = "double-rocker"\nfull_turn = true', "does not turn fully"),
         (ELLIPSE + "[constraints]\nassembly = 2", "be +1 or -1"),
