@@ -200,7 +200,8 @@ def _limits() -> tuple[Statement, ...]:
             step,
             (near("a4 = 0", "1.5", last[0.0], 0.5, "in"),),
             "rounding errors decide: the share of runs that settle is "
-            + ", ".join(f"{shares[0.0][s1]:.0%} at {s1:g} in" for s1 in (0.5, 1.0, 1.5, 2.0)),
+            + ", ".join(f"{shares[0.0][s1]:.0%} at {s1:g} in" for s1 in (0.5, 1.0, 1.5, 2.0))
+            + f". With at most 50 corrections instead of {MAX_STEPS}, it settles at S1 = 0 alone",
         ),
         Statement(
             "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
@@ -215,7 +216,9 @@ def _limits() -> tuple[Statement, ...]:
                 near("converges up to, a4 = 30 in", "9", always, 0.5, "in"),
             ),
             f"at a4 = 10 in every run settles at 4 in, and {shares[10.0][4.5]:.0%} at 4.5 in; at a4 = 20 in every run "
-            f"settles up to 6 in, and {shares[20.0][11.0]:.0%} at 11 in",
+            "settles up to 6 in, and from there to 11 in rounding errors decide. Our choices matter: at a4 = 10 in the limit "
+            "is 4 in with at most 100 corrections, and 2.5 in with steps of 1 deg; at a4 = 30 in it is 12 in or more with at "
+            "most 1000 corrections",
         ),
         Statement(
             "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
@@ -225,7 +228,8 @@ def _limits() -> tuple[Statement, ...]:
             "of seven twists, evenly spaced from 232 to 310 deg, at which it settles",
             "1 deg, the step of alpha4; none for the share",
             (*twists, at_least("232 to 310 deg", 1.0, within)),
-            "but the loops on which it settles are open (erratum 1)",
+            "but the loops on which it settles are open (erratum 1). With at most 50 corrections instead of "
+            f"{MAX_STEPS}, it settles from 234 to 307 deg",
         ),
     )
     return no_offset, increased, *_mechanism_limits(), twist
@@ -274,9 +278,10 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
 
 
 def _inverse_difference(case: Case) -> float:
-    """Return the greatest entry of Delta - A^-1 V for Delta = (A'A)^-1 A'V, over the first corrections of a turn.
+    """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections of a turn.
 
-    A^-1 is the name of (A'A)^-1 A' in L457. A first correction is one from the solution at the previous angle.
+    A^-1 is the inverse of L457, computed from singular values. A first correction is one from the solution at the previous
+    angle.
     """
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     start = np.roll(case_turn(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
@@ -284,8 +289,7 @@ def _inverse_difference(case: Case) -> float:
     matrix, right = equations(*loop, INCH, "printed")
     transposed, right = np.swapaxes(matrix, -1, -2), right[..., None]
     delta = np.linalg.solve(transposed @ matrix, transposed @ right)
-    inverse = np.linalg.inv(transposed @ matrix) @ transposed
-    return float(np.abs(delta - inverse @ right).max())
+    return float(np.abs(delta - np.linalg.pinv(matrix) @ right).max())
 
 
 def _matrices() -> tuple[Statement, ...]:
@@ -358,7 +362,8 @@ def _step() -> tuple[Statement, ...]:
             text("section 2.6.1, eqs 19a, 19b, L416"),
             "rank of the nine left sides, by eqs 12 to 16, in a general position. Then the sums of right sides on opposite "
             "sides of the diagonal, which vanish if three equations imply the other six: the order (power) with which these "
-            "sums decrease as an open planar loop is closed",
+            "sums decrease as an open planar loop is closed. On the diagonal of 19a, B11^-1 in our scan is read as B11 - 1 by "
+            "eq 19",
             "none for the rank; order 2, as eq 11 neglects the second order; 0.05, since an order is a whole number",
             (
                 replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
@@ -383,8 +388,8 @@ def _step() -> tuple[Statement, ...]:
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
             "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
-            "greatest difference of the two sides over the first corrections of a turn, where A^-1 means (A'A)^-1 A' as in "
-            f"L457; {OPEN[0].name}, lengths in inches",
+            "greatest difference of Delta by eq 23a from A^-1 V, with A^-1 (by L457 the pseudo-inverse) from singular values, "
+            f"over the first corrections of a turn; {OPEN[0].name}, lengths in inches",
             ROUNDING,
             (nothing("the two sides", _inverse_difference(OPEN[0])),),
             "A is 6 x 5, so that Delta need not satisfy eq 23 itself",

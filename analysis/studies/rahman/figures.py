@@ -375,7 +375,7 @@ def _constant() -> tuple[Statement, ...]:
             "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
             "possible, because small sine or cosine terms in the denominator sometimes results in inaccurate division.",
             text("section 2.8, L961"),
-            "number of unknown components of the joint forces and moments, including 1F1k (erratum 7); number of eqs 62a to "
+            "number of unknown components of the joint forces and moments, including 1F1k; number of eqs 62a to "
             "64f without 63b and with 62c mended; their rank in these unknowns in a general position, which is 16 if one "
             "equation is redundant",
             "none, since counts are exact",
@@ -384,7 +384,7 @@ def _constant() -> tuple[Statement, ...]:
                 replace(near("equations", 17.0, len(equations), 0.0), stated="seventeen"),
                 near("rank", 16.0, np.linalg.matrix_rank(equations), 0.0),
             ),
-            "no equation is redundant. The remark on sines and cosines is not measured",
+            "erratum 7: with 1F1k unknown, no equation is redundant. The remark on sines and cosines is not measured",
         ),
     )
 
