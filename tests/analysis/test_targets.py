@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ellipe
 
-from analysis.files import read_points, write_csv
+from analysis.files import attribute_files, read_points, write_csv
 from analysis.synthesis import TargetPath, curve_distance, function_from_formula, path_from_formula
 from analysis.synthesis.task.target import even_odd_area, formula
 from linkwork.errors import InputError, ParameterError, UnknownNameError
@@ -350,7 +350,10 @@ def test_points_from_csv(tmp_path: Path, text: str) -> None:
     ],
 )
 def test_the_unit_in_the_header_line_holds(tmp_path: Path, header: str, unit: str | None, factor: float) -> None:
-    points, _ = read_points(save(tmp_path, "a.csv", f"{header}\n0,0\n1,0\n1,2.5\n"), unit=unit)
+    with attribute_files("synthesize") as command:
+        points, _ = read_points(save(tmp_path, "a.csv", f"{header}\n0,0\n1,0\n1,2.5\n"), unit=unit)
+    # what a unit is assumed for is noted
+    assert ("column 1 in m and column 2 in m" in "".join(command.notes)) == (factor == 1.0)
     assert points == pytest.approx(factor * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.5]]))
 
 
