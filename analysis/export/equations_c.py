@@ -527,6 +527,7 @@ def _tableau() -> str:
         "LEAST_FACTOR": integrator.LEAST_FACTOR,
         "GREATEST_FACTOR": integrator.GREATEST_FACTOR,
         "LEAST_STEP": integrator.LEAST_STEP,
+        "PROBE": integrator.PROBE,
     }
     lines = [
         "/* Coefficients of DOP853: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I. Generated. */",

@@ -6,7 +6,7 @@ import hashlib
 import importlib
 import re
 import sys
-from math import cos, degrees, hypot, isfinite, pi, remainder, sin, sqrt, tau
+from math import cos, degrees, hypot, inf, isfinite, pi, remainder, sin, sqrt, tau
 from pathlib import Path
 from traceback import extract_tb, walk_tb
 from types import SimpleNamespace
@@ -426,21 +426,24 @@ class Package:
         )
 
     def _greatest_rotation(self) -> str:
-        """Write the `Mechanism.greatest_rotation`: 10 deg of what turns fastest at the ends of a spring with a force law."""
-        laws = [spring for spring in self.description.springs.values() if spring.law]
-        if not laws:
-            return "inf"
-        fastest = 1.0
+        """Write the `Mechanism.greatest_rotation`, for what turns fastest at the springs with a force law and at the dyads.
+
+        It is 10 deg at the ends of such a spring, and 20 deg at what carries a dyad, whose limit of assembly may be narrow.
+        """
+        springs = []
+        for spring in self.description.springs.values():
+            if spring.law:
+                ends = [self.motion.owner(point) for point in spring.between] or self.interface.twisted_bodies(spring)
+                springs.append(ends or self.structure.joints[spring.at].bodies)
+        carried = [(GROUND, side.parent) for dyad in self.structure.dyads for side in dyad.sides]
+        greatest = [inf]
         for n in range(len(self.interface.drives)):
             turned = rotations(self.description, self.structure, n)
-            for spring in laws:
-                ends = [self.motion.owner(point) for point in spring.between] or (
-                    self.interface.twisted_bodies(spring) or self.structure.joints[spring.at].bodies
-                )
-                first, second = (turned.get(body, 0.0) for body in ends)
-                ratio = abs(second - first)
-                fastest = max(fastest, ratio if isfinite(ratio) else 1.0)
-        return f"radians({10.0 / fastest!r})"
+            for most, pairs in ((10.0, springs), (20.0, carried)):
+                for first, second in pairs:
+                    ratio = abs(turned.get(second, 0.0) - turned.get(first, 0.0))
+                    greatest.append(most / max(1.0, ratio if isfinite(ratio) else 1.0))
+        return f"radians({min(greatest)!r})" if min(greatest) < inf else "inf"
 
 
 def _imports(body: str) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
-from linkwork.integrate import LEAST_STEP
+from linkwork.integrate import LEAST_STEP, PROBE
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inline, inner, kernel, part
@@ -42,7 +42,17 @@ from .records import (
     state_clearance,
 )
 from .sources import SOURCE, Source, find, hold, is_bar_unwound, is_bar_wound, write_channels
-from .stepping import EXPONENT, STAGES, Flow, attempt, bounded_step_size, interpolate, next_step_size, shorter_step_size
+from .stepping import (
+    EXPONENT,
+    STAGES,
+    Flow,
+    attempt,
+    bounded_step_size,
+    interpolate,
+    next_step_size,
+    shorter_step_size,
+    step_short_of_limit,
+)
 
 #: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
 GREATEST_SHARE = 1e-3
@@ -134,12 +144,22 @@ def choose_first_size(motion):
 
 
 @inner
-def next_size(carry, rates, reach, lane, lanes):
-    """Return the size of the next step from a state with these rates, and whether it is the last of its interval."""
+def next_size(carry, size):
+    """Return the size of the next step, which is at most ``size``, and whether it is the last of its interval."""
     remaining = (carry.stop - carry.begin) - carry.elapsed
-    size = bounded_step_size(carry.step, rates, reach, lane, lanes)
     last = size >= remaining * (1.0 - 1e-10)
     return remaining if last else min(size, 0.5 * remaining), last
+
+
+@inner
+def _bounded_size(motion):
+    """Return the proposed step size, shortened so that the step passes over no force and no limit of assembly."""
+    x, room = motion.x, motion.room
+    h = bounded_step_size(motion.carry.step, room.k[0], motion.problem.reach, 0, 1)
+    for i in range(x.shape[0]):
+        room.z[i] = x[i] + PROBE * h * room.k[0, i]
+    clearance = state_clearance(x, motion.u, motion)
+    return step_short_of_limit(h, clearance, state_clearance(room.z, motion.u, motion))
 
 
 @inner
@@ -257,7 +277,7 @@ def _cross_interval(motion, most):
             # after a rejected step the inputs are those of one of its stages
             renew(carry.elapsed, x, motion.u, motion)
             return RUNNING
-        h, last = next_size(carry, room.k[0], motion.problem.reach, 0, 1)
+        h, last = next_size(carry, _bounded_size(motion))
         t_new = carry.stop if last else carry.begin + (carry.elapsed + h)
         error = _attempt(h, motion)
         good, inside, clearance = False, False, 0.0

@@ -18,7 +18,7 @@ import numpy as np
 from numba import int64, types
 from numpy.typing import NDArray
 
-from linkwork.integrate import LEAST_STEP
+from linkwork.integrate import LEAST_STEP, PROBE
 from linkwork.limits import LIMIT_SINE
 
 from ..numerics.codegen import copy, evaluate, inline, inner, kernel, part
@@ -41,7 +41,7 @@ from .equations import CLEARANCE, DERIVATIVE
 from .locating import end_step, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
 from .sources import ADDRESSES, SOURCE, Source
-from .stepping import STAGES, next_step_size, shorter_step_size
+from .stepping import STAGES, bounded_step_size, next_step_size, shorter_step_size, step_short_of_limit
 from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpolate_in_lanes, stage_in_lanes
 
 
@@ -51,7 +51,8 @@ class Lanes(NamedTuple):
     ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the index of its run or -1, ``phase`` and
     ``outcome`` are constants of this module, ``last`` is 1 if the step is the last of its interval. In lanes: state ``x``,
     state at the end of the step ``y`` and at a stage ``z``, modes, channels, constants, scales, step size, error, fraction of
-    the step, stages, interpolant, clearance. Row l of ``between`` is the state of lane l at its fraction of the step.
+    the step, stages, interpolant, clearance at the end of the step and after `PROBE` of it. Row l of ``between`` is the state
+    of lane l at its fraction of the step.
     """
 
     code: NDArray[np.int64]
@@ -72,6 +73,7 @@ class Lanes(NamedTuple):
     k: NDArray[np.float64]
     f: NDArray[np.float64]
     clearance: NDArray[np.float64]
+    ahead: NDArray[np.float64]
     between: NDArray[np.float64]
 
 
@@ -89,7 +91,7 @@ def _make_lanes(code, states, modes, channels, constants):
         code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
         np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
         np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)),
-        np.zeros((7, n)), np.zeros(LANES), np.zeros((LANES, states)),
+        np.zeros((7, n)), np.zeros(LANES), np.zeros(LANES), np.zeros((LANES, states)),
     )  # fmt: skip
 
 
@@ -264,8 +266,16 @@ def _choose_sizes(v, w):
                 read_lane(lane, LANES, v.z, w.room.k[0])
                 write_lane(lane, LANES, w.room.k[0], v.k[0])
                 choose_first_size(_motion(i, w))
-            v.h[lane], v.last[lane] = next_size(carry, v.k[0], w.problem.reach, lane, LANES)
+            v.h[lane] = bounded_step_size(carry.step, v.k[0], w.problem.reach, lane, LANES)
             carry.steps += 1
+    for j in range(v.x.shape[0]):
+        v.z[j] = v.x[j] + PROBE * v.h[j % LANES] * v.k[0, j]
+    _equation(CLEARANCE, v.x, v.clearance, v)
+    _equation(CLEARANCE, v.z, v.ahead, v)
+    for lane in range(LANES):
+        if v.run[lane] >= 0:
+            size = step_short_of_limit(v.h[lane], v.clearance[lane], v.ahead[lane])
+            v.h[lane], v.last[lane] = next_size(w.state.carries[v.run[lane]], size)
 
 
 @inner

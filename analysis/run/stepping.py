@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork import tableau
-from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
+from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, PROBE, SAFETY
 
 from ..numerics.codegen import evaluate, inline, inner
 from ..numerics.vectors import nonzero_weights, weighted_rows
@@ -97,6 +97,18 @@ def bounded_step_size(h, rates, reach, lane, lanes):
         if h * rate > reach[i]:
             h = reach[i] / rate
     return h
+
+
+@inner
+def step_short_of_limit(h, clearance, ahead):
+    """Return a step size, shortened so that the clearance, at its rate, falls by no more than half; see `PROBE`.
+
+    ``ahead`` is the clearance that the rates at the beginning of the step give after the fraction `PROBE` of the step h.
+    """
+    fall = clearance - ahead
+    if isnan(fall):  # beyond the limit
+        return PROBE * h
+    return 0.5 * PROBE * h * clearance / fall if fall > 0.5 * PROBE * clearance else h
 
 
 @inner

@@ -24,6 +24,8 @@ LEAST_FACTOR = 0.2
 GREATEST_FACTOR = 6.0
 #: Shortest step as a fraction of the whole interval, below which the integration gives up.
 LEAST_STEP = 1e-14
+#: Fraction of a step over which the rate of the clearance is estimated.
+PROBE = 1e-3
 #: Exceptions that a right-hand side may raise where it is not defined; a shorter step is then tried.
 UNDEFINED = (ArithmeticError, ValueError)
 
@@ -116,6 +118,7 @@ def integrate(
     scale: Vector,
     step: float = 0.0,
     reach: Vector = (),
+    clearance: Callable[[Vector], float] | None = None,
     accept: Callable[[Vector], None] | None = None,
     max_steps: int = 20_000,
 ) -> Result:
@@ -139,6 +142,8 @@ def integrate(
         First step size to try, such as `Result.step` of the previous interval; if 0, the integrator chooses.
     reach : tuple of float
         Largest change of each component in a step, as far as its rate at the beginning of the step tells; any change if empty.
+    clearance : callable, optional
+        Distance of a state from a limit, which a step at most halves, as far as its rate at the beginning of the step tells.
     accept : callable, optional
         Called with each accepted state, which is finite; may raise to stop the integration.
     max_steps : int
@@ -159,6 +164,8 @@ def integrate(
     while True:
         remaining = duration - done
         size = bounded_step(proposal, k1, reach)
+        if clearance is not None:
+            size = _step_short_of_limit(size, x, k1, clearance)
         last = size >= remaining * (1.0 - 1e-10)
         h = remaining if last else min(size, 0.5 * remaining)
         steps += 1
@@ -205,6 +212,16 @@ def bounded_step(step: float, rates: Vector, reach: Vector) -> float:
         if step * abs(rate) > most:
             step = most / abs(rate)
     return step
+
+
+def _step_short_of_limit(step: float, x: Vector, rates: Vector, clearance: Callable[[Vector], float]) -> float:
+    """Return a step size, shortened so that the clearance, at its rate, falls by no more than half."""
+    now = clearance(x)
+    try:
+        fall = now - clearance(tuple(a + PROBE * step * rate for a, rate in zip(x, rates)))
+    except UNDEFINED:  # beyond the limit
+        return PROBE * step
+    return 0.5 * PROBE * step * now / fall if fall > 0.5 * PROBE * now else step
 
 
 def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:

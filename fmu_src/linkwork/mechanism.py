@@ -317,7 +317,7 @@ class Mechanism:
         Messages of this AssemblyError, also used by the FMU in C; None if the links can always be joined.
     greatest_rotation : float
         Largest change of an angle among the freedoms in a step of the integrator (rad), so that no step passes over a force
-        that acts over a small angle only; infinite if there is no such force.
+        that acts over a small angle only, and none over a limit of assembly; infinite if there is neither.
     switch : str
         Name of the only constant on which the equations may branch: they may differ between zero and positive values of this
         constant. The equations are traced once for each of the two cases, so that terms that are switched off cost nothing.

@@ -288,7 +288,7 @@ class Plant:
             raise StepError(f"a step {way}: it starts at t = {time:.9g} s, but the state is at t = {self.time:.9g} s")
         self._check_inputs()
         i = self._applied_inputs()
-        derivative, p = self.mechanism.equations.derivative, self._p
+        derivative, clearance, p = self.mechanism.equations.derivative, self.mechanism.equations.clearance, self._p
         # at the start every commanded rate jumps to its input, even if the input was not set again, as the contract says
         x = self._jump_rates(self.state, i, self.inputs)
         last = x
@@ -307,6 +307,7 @@ class Plant:
                 scale=self._scale,
                 step=self._step_size,
                 reach=self.mechanism.reach,
+                clearance=lambda y: clearance(y, i, p),
                 accept=accept,
             )
         except LinkworkError as error:

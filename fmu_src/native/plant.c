@@ -344,11 +344,16 @@ static double first_step(const Plant *a, const double x[STATES], const double sl
     return ratio == 0.0 ? duration : fmin(duration, pow(a->tolerance, 1.0 / ORDER) / ratio);
 }
 
-/* The step, shortened so that no angle of a freedom, at its rate, turns by more than its reach. */
-static double bounded_step(double step, const double slope[STATES]) {
+/* The step, shortened so that no angle of a freedom, at its rate, turns by more than its reach, and the clearance falls by no
+   more than half. */
+static double bounded_step(const Plant *a, double step, const double x[STATES], const double slope[STATES]) {
+    double ahead[STATES];
     for (int i = 0; i < STATES; i++)
         if (step * fabs(slope[i]) > reach[i]) step = reach[i] / fabs(slope[i]);
-    return step;
+    for (int i = 0; i < STATES; i++) ahead[i] = x[i] + PROBE * step * slope[i];
+    double clearance = state_clearance(a, x), fall = clearance - state_clearance(a, ahead);
+    if (isnan(fall)) return PROBE * step; /* beyond the limit */
+    return fall > 0.5 * PROBE * clearance ? 0.5 * PROBE * step * clearance / fall : step;
 }
 
 /* The longest part of a step h from x that stays clear of the limit of assembly: it is written to x. */
@@ -423,7 +428,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
     if (!all_finite(k, STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k, *duration);
     for (int steps = 1;; steps++) {
-        double remaining = *duration - done, size = bounded_step(proposal, k);
+        double remaining = *duration - done, size = bounded_step(a, proposal, x, k);
         bool last = size >= remaining * (1.0 - 1e-10);
         double h = last ? remaining : fmin(size, 0.5 * remaining);
         if (steps > MAX_STEPS) {

@@ -1,5 +1,6 @@
 """Described linkages: against multipliers in all coordinates, against the hand-written five-bar, energy, files, mistakes."""
 
+import contextlib
 import importlib
 import inspect
 import itertools
@@ -39,7 +40,8 @@ from analysis.periodic import (
 from analysis.run import Inputs, TorsionBar, Trajectory, cosimulate, load_case, simulate, simulate_many
 from analysis.tuning import Limit, Wish, tune
 from analysis.tuning.conditions import limited_value, sample_turn
-from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterError, UnknownNameError
+from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
@@ -1306,3 +1308,50 @@ def test_a_step_is_bounded_by_what_turns_fastest_and_without_a_period(make: Call
 def test_a_periodic_motion_meets_a_force_that_acts_over_a_few_degrees(find: Callable[..., Any]) -> None:
     orbit = find(variant(punch().name, load_c=0.05), Drive(torque=1.0), start=[12.0])
     assert orbit.turn()["wheel.speed"].mean() == pytest.approx((1.0 - WORK / (2.0 * math.pi)) / 0.05, rel=1e-3)
+
+
+def level_four_bar(coupler: float, mass: float) -> tuple[Mechanism, float]:
+    """A level four-bar that all but is a parallelogram, whose crank alone has a mass or whose energies do not change.
+
+    Beside it the crank angle at which it comes within 1e-3 of the line of its bodies, by the law of cosines.
+    """
+    built = linkage("level-four-bar", ground={"A": (0, 0), "D": (0.2, 0)}, assembly={"C": -1})
+    built.body("crank", bar=("A", "B"), length=0.05, mass=0.1, inertia=1e-4)
+    built.body("coupler", bar=("B", "C"), length=coupler, mass=mass)
+    built.body("rocker", bar=("D", "C"), length=0.05, mass=mass)
+    made = built.freedom("crank", "A", speed="300 rpm", start=0.3).mechanism()
+    far = coupler**2 + 0.05**2 + 2.0 * coupler * 0.05 * math.sqrt(1.0 - LIMIT_SINE**2)
+    return made, math.acos((0.2**2 + 0.05**2 - far) / (2.0 * 0.2 * 0.05))
+
+
+def end_of_plant(mechanism: Mechanism, _: Path) -> float:
+    known, inputs = mechanism.first_set, {"drive.speed": 10.0 * math.pi}
+    plant = Plant(mechanism, known.parameters, known.initial, inputs=inputs)
+    with contextlib.suppress(AssemblyError):
+        while plant.time < 0.3:
+            plant.step(plant.time, 0.0005)
+    return plant.state[0]
+
+
+def end_alone(mechanism: Mechanism, _: Path) -> float:
+    return simulate(mechanism.name, stop_time=0.3)["crank.angle"][-1]
+
+
+def end_of_many(mechanism: Mechanism, _: Path) -> float:
+    return simulate_many([mechanism.first_set] * 9, stop_time=0.3)[8]["crank.angle"][-1]
+
+
+def end_native(mechanism: Mechanism, folder: Path) -> float:
+    run = cosimulate(build_native(mechanism, NATIVE, folder), mechanism.first_set, stop_time=0.3, step=0.0005)
+    return run["crank.angle"][-1]
+
+
+@pytest.mark.parametrize(("coupler", "mass"), [(0.2, 0.1), (0.2, 0.0), (0.199999, 0.0)])
+@pytest.mark.parametrize(
+    "run", [end_of_plant, end_alone, end_of_many, pytest.param(end_native, marks=[pytest.mark.slow, pytest.mark.fmu])]
+)
+def test_no_step_passes_over_a_limit_of_assembly(
+    run: Callable[..., float], coupler: float, mass: float, tmp_path: Path
+) -> None:
+    mechanism, limit = level_four_bar(coupler, mass)
+    assert limit - 0.01 * math.pi < run(mechanism, tmp_path) < limit + 1e-6
