@@ -169,8 +169,10 @@ def test_basins_are_in_the_plane_that_the_motions_span() -> None:
     assert same.labels[0] == "lift.position [m]"
     axis = plot(swings).axes[0]
     assert axis.get_xlabel() == "swing angle at crank angle 0, all else as in motion 1 [deg]"
+    # the motion that hangs still is at an end of the axis, to rounding
+    low, high = axis.get_xlim()
     for marks in axis.lines[:2]:
-        assert all(axis.get_xlim()[0] <= x <= axis.get_xlim()[1] for x in np.asarray(marks.get_xdata()))
+        assert all(low - 1e-9 <= x <= high + 1e-9 for x in np.asarray(marks.get_xdata()))
     with pytest.raises(InputError, match=r"free coordinate 'swing\.speed'"):
         basins(parameters, drive, points=2, found=found, coordinate="swing.speed")
 
