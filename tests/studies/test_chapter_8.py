@@ -72,6 +72,9 @@ class TestPulses:
         between = np.arange(low, high if high > low else high + len(torque)) % len(torque)
         work = (torque.mean() - torque[between]).sum() * 2.0 * np.pi / len(torque)
         assert 0.5 * inertia * (speed[high] ** 2 - speed[low] ** 2) == pytest.approx(work, rel=0.02)
+        # by a program of its own, which integrates Fourier series
+        assert np.ptp(instruments.pulse_speeds(speed)) / np.ptp(speed) == pytest.approx(0.995952, abs=2e-5)
+        assert instruments.pulse_error(speed) == pytest.approx(7.2564e-5, rel=1e-3)
 
 
 @pytest.mark.parametrize(("spring", "damping"), [("A", 9.0), ("C", 5.5)])
@@ -171,6 +174,13 @@ class TestRig1:
         found = {580.0: 89.85, 600.0: 83.60, 620.0: 78.95, 660.0: 71.15, 680.0: 67.35, 720.0: 59.20, 780.0: 43.80}
         angles = [chapter_8._fall_angle(rigs.turn("B", speed)) for speed in found]
         assert angles == pytest.approx(list(found.values()), abs=0.06)
+
+    @pytest.mark.parametrize(
+        ("spring", "rpm", "cm"), [("A", 240.0, 0.3117468), ("A", 280.0, 0.6961297), ("B", 570.0, 1.4390278)]
+    )
+    def test_amplitude(self, spring: str, rpm: float, cm: float) -> None:
+        """By collocation of the links' equations of Newton and Euler, with the extremes between the samples."""
+        assert rigs.amplitude(rigs.turn(spring, rpm)) == pytest.approx(cm, abs=1e-6)
 
     @pytest.mark.parametrize(("rpm", "peaks"), [(150.0, 8), (200.0, 6), (250.0, 4), (500.0, 2)])
     def test_peaks(self, rpm: float, peaks: int) -> None:

@@ -68,7 +68,7 @@ _ROWS = (
     ("7.11", "series_2", "7.3.2, L5941", "Series 2: weighted rocker function, slider moved"),
     ("7.12", "series_2", "7.3.2, L5973", "Series 2: path (b), slider moved"),
     ("8.1", "", "8.2.1.1, L6118", "Rig 1, a side plate of the guide removed"),
-    ("8.2", "", "8.2.1.1, L6124", "Rig 1 from above: coupling to the motor, slider and guide"),
+    ("8.2", "", "8.2.1.1, L6122", "Rig 1 from above: coupling to the motor, slider and guide"),
     ("8.3", "", "8.2.1.1, L6126", "Rig 1: exploded views of linkage (a) and guide (b)"),
     (
         "8.4",

@@ -30,6 +30,11 @@ SPEEDS = np.unique(np.append(np.arange(10.0, 45.0, 0.05), AT_PEAKS[AT_PEAKS > 10
 CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
 #: Amplitude u/l4 above which a speed counts as resonant.
 LARGE = 0.05
+#: Tolerances of a single region near twice the natural frequency, in words.
+OF_REGION = (
+    f"{ABOUT:g} of 2, the rule for *near*, which we use for *vicinity* too; {SMALL:g}, the rule for *negligible*: a narrower "
+    "region would not count"
+)
 #: Words for the equation behind the numbers of chapters IV and V, for the speeds and for the dampers.
 RIGHT = "right linear equation"
 SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05, closer at the resonances (our choice)"
@@ -135,8 +140,7 @@ def judge_introduction() -> tuple[Statement, ...]:
             "for the resonance, the difference of the amplitude from that of a single mass, as at L7102. For the stability, as "
             "at L7116: speed in the middle of the region near twice the natural frequency, relative to this frequency, and "
             "width of the region at the natural frequency",
-            f"{ABOUT:g}, the rule for *similar* and, of 2, for *near*, for *vicinity* too; {SMALL:g}, the rule for "
-            "*negligible*, for a region that is not counted",
+            f"{ABOUT:g}, the rule for *similar*; {OF_REGION}",
             (
                 *judge_oscillator("near half the natural frequency the second harmonic has its own resonance"),
                 *judge_single_region(),
@@ -243,8 +247,7 @@ def _on_stability() -> tuple[Statement, ...]:
             "region near twice the natural frequency: greatest width in lambda_k^2 relative to its middle; speed in its "
             "middle relative to this frequency, with the mean mass, the farthest from 2. For *only*, the least width of the "
             f"region at the natural frequency, relative to that of this region. I4 = 0.25 to 2, without a damper, {RIGHT}",
-            f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {ABOUT:g} of 2, the rule for *near*, which we "
-            "use for *vicinity* too",
+            f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {OF_REGION}",
             (at_most("width", SMALL, narrow), *judge_single_region()),
         ),
         Statement(

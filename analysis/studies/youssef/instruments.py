@@ -6,6 +6,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
@@ -28,17 +29,15 @@ def crank_speed(inertia: float) -> NDArray[np.float64]:
     The torque that the links need is that of the steady motion at `PULSED` rpm.
     """
     torque = turn("A", PULSED)["drive.applied_torque"]
-    energy = np.cumsum(torque.mean() - torque) * 2.0 * pi / len(torque)
-    energy = np.append(energy[-1], energy)
+    angle = np.linspace(0.0, 2.0 * pi, len(torque) + 1)
+    energy = CubicSpline(angle, torque.mean() - np.append(torque, torque[0])).antiderivative()(angle)
     return np.asarray(np.sqrt((PULSED * RAD_S_PER_RPM) ** 2 + 2.0 * (energy - energy.mean()) / inertia))
 
 
 def pulse_speeds(speed: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean speeds between successive holes (rad/s), from the times at which the holes pass the photocell."""
-    angle = np.linspace(0.0, 2.0 * pi, len(speed))
-    time = np.append(0.0, np.cumsum(0.5 * (1.0 / speed[1:] + 1.0 / speed[:-1]) * np.diff(angle)))
-    width = np.diff(np.interp(np.linspace(0.0, 2.0 * pi, HOLES + 1), angle, time))
-    return np.asarray(2.0 * pi / HOLES / width)
+    time = CubicSpline(np.linspace(0.0, 2.0 * pi, len(speed)), 1.0 / speed).antiderivative()
+    return np.asarray(2.0 * pi / HOLES / np.diff(time(np.linspace(0.0, 2.0 * pi, HOLES + 1))))
 
 
 def pulse_error(speed: NDArray[np.float64]) -> float:

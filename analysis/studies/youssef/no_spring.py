@@ -43,11 +43,13 @@ class Drift:
     """Motion of the slider without a spring: crank rotation (turns), slider position (cm), and when the links become collinear.
 
     ``collinear_turn`` is the crank rotation at that moment (turns), NaN if the coupler and the rocker never become collinear.
+    ``compared`` is the last turn that is compared with others and with a line.
     """
 
     turns: NDArray[np.float64]
     slider_cm: NDArray[np.float64]
     collinear_turn: float
+    compared: int = DRAWN_TURNS
 
     def turn(self, number: int) -> NDArray[np.float64]:
         """Return the slider position (cm) over the turn ``number``, counted from 1, both ends included."""
@@ -61,8 +63,8 @@ class Drift:
 
     @property
     def _last(self) -> int:
-        """Return the number of the last whole turn before the links are collinear, at most `DRAWN_TURNS`."""
-        return int(np.fmin(DRAWN_TURNS, self.collinear_turn))
+        """Return the number of the last whole turn before the links are collinear, at most ``compared``."""
+        return int(np.fmin(self.compared, self.collinear_turn))
 
     @property
     def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -102,7 +104,7 @@ class Drift:
 
     @property
     def unsteadiest(self) -> float:
-        """Return the greatest `unsteadiness` of the turns after the transient, up to `DRAWN_TURNS`."""
+        """Return the greatest `unsteadiness` of the turns after the transient, up to ``compared``."""
         return max(self.unsteadiness(n) for n in range(TRANSIENT_TURNS + 1, self._last))
 
     @property

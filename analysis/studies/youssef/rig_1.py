@@ -73,8 +73,8 @@ def compute_rig_1() -> StudyResult:
     accommodated = {s: accommodated_amplitude(s) for s in "AB"}
     at, most = accommodated["B"]
     return StudyResult(
-        claim="With spring A there is one motion at each speed. With spring B the resonance curve leans over, and below its "
-        "peak two stable motions exist at the same speed.",
+        claim="With spring A there is one motion at each speed. With spring B the resonance curve leans towards lower "
+        "speeds, and from 917 to 1036 rpm two stable motions exist at the same speed.",
         columns=pad_columns(columns),
         statements=(
             Statement(
@@ -181,7 +181,7 @@ def slight_coefficients() -> tuple[float, float]:
         return float((amplitude_decrease(coefficient) / smooth).max()) - part
 
     ends = 0.5 * SLIGHT, 3.0 * SLIGHT
-    least, most = (float(brentq(beyond, *ends, args=(part,), xtol=1e-4)) for part in (ALIKE, SLIGHTLY))
+    least, most = (float(brentq(beyond, *ends, args=(part,), xtol=1e-6)) for part in (ALIKE, SLIGHTLY))
     return least, most
 
 
@@ -315,7 +315,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
         Statement(
             "The differences may be attributed to the same factors as previously described with spring A.",
             text("8.4.1.1, L6528"),
-            why="the measured curves are lost, and two of the three factors have no size",
+            why="the measured curves are lost, and no size of the factors is given",
         ),
     )
 

@@ -127,7 +127,7 @@ def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArr
 
 def amplitude(motion: Turn) -> float:
     """Return the amplitude (cm): half the range of the slider position."""
-    return 0.5 * float(np.ptp(slider(motion)))
+    return CM_PER_METRE * motion.amplitude
 
 
 def count_sign_changes(x: NDArray[np.float64]) -> int:
@@ -147,8 +147,8 @@ def harmonic(motion: Turn, order: int) -> float:
 
 @cache
 def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
-    """Find the speed (rpm, to 0.1), between two limits, above which the slider has two extrema per turn instead of four."""
-    while high - low > 0.1:
+    """Find the speed (rpm, to 0.01), between two limits, above which the slider has two extrema per turn instead of four."""
+    while high - low > 0.01:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if peaks(turn(spring, middle)) > 2 else (low, middle)
     return 0.5 * (low + high)
