@@ -151,7 +151,10 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
                 seconds=1e9, hang=hang, parent=parent, first=int(number), last=int(number) + 1,
             )  # fmt: skip
             _run(job, report)
-        return journal.read(job.journal).lines, report.findings
+        entry = journal.read(job.journal)
+        if entry.case < 0 and not report.findings:
+            raise InputError(f"there is no case {case!r}: the check {check} has fewer cases, or skips this FMU")
+        return entry.lines, report.findings
 
 
 def _extract(fmu: Path, folder: Path) -> Any:

@@ -209,6 +209,9 @@ def test_the_command_reports_and_replays(fmu, tmp_path, monkeypatch):
     code, output = run(fmu, "--replay", "0/cs/forbidden/0")
     assert code == 4
     assert "fmi2Instantiate('probe', 1, '{0}'" in output
+    code, output = run(fmu, "--replay", "0/cs/split/1")
+    assert code == 1
+    assert "fewer cases" in output
     monkeypatch.setenv("PROBE_FAULT", "euler")
     assert run(fmu, "--check", "split")[0] == 0
     assert run(fmu, "--check", "split", "--strict")[0] == 4
