@@ -272,8 +272,8 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[
             "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
             "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
             text("7.1.1 (b), L5311-5319"),
-            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 rpm. "
-            "Only spring, damper and the forces of the links move the slider",
+            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 "
+            "rpm. Only spring, damper and the forces of the links move the slider",
             f"more than {READ:g}, the accuracy to which a graph can be read",
             (
                 at_least("spring, continuous", READ, spring_range()),
@@ -403,9 +403,9 @@ def judge_strategy() -> tuple[Statement, ...]:
             "five bar loop.",
             text("7.4, L6013"),
             "error with the slider moved by its best two harmonics within the limits of the next row, relative to that with "
-            "the pivot fixed, for the printed links, mended. Our example of another link is a second crank, geared to the first "
-            "(L6017), which moves the rocker pivot on a circle about its printed place; we take the best length, phase and gear "
-            "ratio of 1, -1, 2 and -2",
+            "the pivot fixed, for the printed links, mended. Our example of another link is a second crank, geared to the "
+            "first (L6017), which moves the rocker pivot on a circle about its printed place; we take the best length, phase "
+            "and gear ratio of 1, -1, 2 and -2",
             SEEN_FALL,
             (
                 at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
