@@ -109,7 +109,7 @@ def textbook(linkage: syn.Linkage) -> tuple[float, float]:
 
 
 class TestQuickReturn:
-    @pytest.mark.parametrize(("ratio", "least"), [(1.0, 40.0), (1.1, 40.0), (1.25, 40.0), (1.5, 20.0)])
+    @pytest.mark.parametrize(("ratio", "least"), [(1.0, 40.0), (1.1, 40.0), (1.25, 40.0), (1.5, 20.0), (1.8, 15.0)])
     def test_stroke_and_time_ratio_are_those_asked_for(self, ratio: float, least: float) -> None:
         task = syn.QuickReturn(stroke="80 mm", time_ratio=ratio)
         found = syn.synthesize(task, constraints=[syn.LeastTransmission(angle=radians(least))])
@@ -148,6 +148,19 @@ class TestQuickReturn:
 
         found = differential_evolution(worst, [(0.01, 0.05), (0.05, 0.5)], seed=1, maxiter=200, tol=1e-10)
         assert np.cos(best.least_transmission) == pytest.approx(found.fun, rel=1e-4)
+
+    @pytest.mark.parametrize(
+        ("task", "fixed"),
+        [
+            (syn.QuickReturn(stroke=0.1, time_ratio=1.1), {"ground_length": 0.02}),
+            (syn.QuickReturn(stroke=0.1, time_ratio=1.1), {"crank_length": 0.0495}),
+            (syn.QuickSwing(swing="60 deg", time_ratio=1.1), {"rocker_length": 0.08, "ground_length": 0.2}),
+        ],
+    )
+    def test_links_may_be_fixed(self, task: syn.Task, fixed: dict[str, float]) -> None:
+        best = syn.synthesize(task, {name: (x, x) for name, x in fixed.items()}, [syn.FullTurn()]).best
+        assert {name: getattr(best.linkage, name) for name in fixed} == pytest.approx(fixed, rel=1e-8)
+        assert best.evaluation.worst < 1e-9 and best.verdicts.full_turn
 
     def test_what_cannot_be_had_is_said(self) -> None:
         with pytest.raises(syn.InfeasibleError, match=r"time ratio of 1.5 the best slider-crank has 27.46 deg"):

@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from linkwork.errors import InputError, ParameterError
 
@@ -473,16 +473,18 @@ def quick_returns(
     if len(branches) > 1:
         raise InfeasibleError("the constraints require both assemblies at once")
     cosine: Callable[[float], float]
+    margins: Callable[[float], FloatArray]
     if isinstance(task, QuickReturn):
         ends = _dimension_ranges(task, bounds, constraints)
         asked, kind = f"a stroke of {1e3 * float(task.stroke):g} mm", "slider-crank"
         cosine, couplers = partial(_transmission_cosine, task=task, ends=ends), ends["coupler_length"]
+        margins = partial(_bound_margins, task=task, ends=ends)
     else:
         shape = _SwingShapes(task, bounds, constraints)
         asked, kind = f"a swing of {degrees(float(task.swing)):g} deg", "crank-rocker"
-        cosine, couplers = shape.cosine, shape.couplers
+        cosine, couplers, margins = shape.cosine, shape.couplers, shape.margins
     asked += f" and a time ratio of {task.time_ratio:g}"
-    l3, least = _best_coupler(cosine, couplers), _least_angle(constraints)
+    l3, least = _best_coupler(cosine, couplers, margins), _least_angle(constraints)
     if not cosine(l3) < 1.0:
         raise InfeasibleError(f"no {kind} with {asked} has a crank that turns fully within these bounds")
     if acos(cosine(l3)) < least:
@@ -501,12 +503,24 @@ def _least_angle(constraints: Sequence[Any]) -> float:
     return max((float(c.angle) for c in constraints if isinstance(c, LeastTransmission)), default=0.0)
 
 
-def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -> float:
-    """Find the coupler length, between two bounds, that minimises the cosine of the transmission angle."""
+def _best_coupler(
+    cosine: Callable[[float], float], ends: tuple[float, float], margins: Callable[[float], FloatArray]
+) -> float:
+    """Find the coupler length, between two bounds, that minimises the cosine of the transmission angle.
+
+    ``margins`` are functions of this length that are zero where a bound of another link is reached: the search includes these
+    lengths, which may be the only ones if that link is fixed.
+    """
     couplers = np.linspace(*ends, COUPLERS)
+    values = np.array([margins(float(l3)) for l3 in couplers])
+    reached = [
+        brentq(lambda l3: margins(l3)[m], *couplers[k : k + 2], xtol=1e-15 * ends[1])
+        for k, m in zip(*np.nonzero(values[:-1] * values[1:] < 0.0))
+    ]
+    couplers = np.sort(np.append(couplers, reached))
     cosines = np.array([cosine(float(l3)) for l3 in couplers])
     best = int(np.argmin(cosines))
-    low, high = couplers[max(best - 1, 0)], couplers[min(best + 1, COUPLERS - 1)]
+    low, high = couplers[max(best - 1, 0)], couplers[min(best + 1, len(couplers) - 1)]
     found = minimize_scalar(cosine, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high})
     return float(min((couplers[best], float(found.x)), key=cosine))
 
@@ -516,30 +530,40 @@ class _SwingShapes:
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
-        self.bounds = _read_bounds(bounds, LINKS, LINKS)
-        self.cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
+        cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
+        self.least, most = np.array(list(_read_bounds(bounds, LINKS, LINKS).values())).T
+        self.most = np.minimum(most, cap)
         chord = 2.0 * sin(0.5 * abs(float(task.swing)))
-        most = chord / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
-        self.couplers = 0.5 * chord, min(most, LARGEST)
+        longest = chord / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
+        self.couplers = 0.5 * chord, min(longest, LARGEST)
         self.chord = chord
 
-    def links(self, l3: float) -> tuple[float, float, float, float] | None:
-        """Return l1 ... l4 (m) for a ratio l3; None if the dead centres need different assemblies, or a bound is violated."""
+    def ratios(self, l3: float) -> tuple[FloatArray, bool]:
+        """Return l1 ... l4 over l4 for a ratio l3, and whether the dead centres need the same assembly."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
         # side of A -> C on which D lies, for both positions of C
         sides = [x * -e - y * reach for reach in (far, far - self.chord)]
-        if l2 <= 0.0 or sides[0] * sides[1] <= 0.0:
+        return np.array([hypot(x, y), l2, l3, 1.0]), l2 > 0.0 and sides[0] * sides[1] > 0.0
+
+    def margins(self, l3: float) -> FloatArray:
+        """Return functions of the ratio l3 that are zero where two bounds of links allow a single size."""
+        found, _ = self.ratios(l3)
+        least, most = self.least[:, None] * found, np.where(np.isfinite(self.most), self.most, 0.0)[:, None] * found
+        return (least - most.T)[:, np.isfinite(self.most)].ravel()
+
+    def links(self, l3: float) -> tuple[float, float, float, float] | None:
+        """Return l1 ... l4 (m) for a ratio l3; None if the dead centres need different assemblies, or a bound is violated."""
+        found, joined = self.ratios(l3)
+        if not joined:
             return None
-        found = dict(zip(LINKS, (hypot(x, y), l2, l3, 1.0)))
-        least = max(low / found[name] for name, (low, _) in self.bounds.items())
-        most = min(min(high, self.cap) / found[name] for name, (_, high) in self.bounds.items())
+        least, most = float((self.least / found).max()), float((self.most / found).min())
         if least > most * (1.0 + 1e-9):
             return None
         # a ground link of 100 mm, or as near to it as the bounds allow
-        scale = min(max(GROUND / found["ground_length"], least), most)
-        return tuple(scale * value for value in found.values())  # type: ignore[return-value]
+        l1, l2, l3, l4 = (min(max(GROUND / found[0], least), most) * found).tolist()
+        return l1, l2, l3, l4
 
     def cosine(self, l3: float) -> float:
         """Return the cosine of the least transmission angle over a turn; 1 if no linkage exists or a bound is violated."""
@@ -612,13 +636,26 @@ def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
 
 
+def _bound_margins(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> FloatArray:
+    """Return by how much offset and crank exceed each of their bounds (m)."""
+    lengths = np.array(_lengths(l3, task.advance, float(task.stroke)))
+    return (lengths[:, None] - [ends["ground_length"], ends["crank_length"]]).ravel()
+
+
 def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
-    """Return the cosine of the least transmission angle over a turn; 1 if no linkage exists or a bound is violated."""
-    l1, l2 = _lengths(l3, task.advance, float(task.stroke))
+    """Return the cosine of the least transmission angle over a turn.
+
+    The result is 1 if no linkage exists, a bound is violated, or the dead centres need different assemblies.
+    """
+    stroke = float(task.stroke)
+    l1, l2 = _lengths(l3, task.advance, stroke)
     for name, value in (("ground_length", l1), ("crank_length", l2)):
         low, high = ends[name]
-        if not low * (1.0 - 1e-12) <= value <= high * (1.0 + 1e-12) or l2 == 0.0:
+        if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
             return 1.0
+    # both dead centres lie on one side of the offset's foot
+    if l2 == 0.0 or (l3 + l2) ** 2 - l1 * l1 <= stroke * stroke:
+        return 1.0
     return min(1.0, (l1 + l2) / l3)
 
 
