@@ -284,7 +284,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE.replace('"cm"', '"kg"'), "it must be a unit of length"),
         (ELLIPSE.replace("24", "2"), "task.n is 2: it must be at least 3"),
         (ELLIPSE + "weights = [1, 2]", "there must be one for each of the 24 targets"),
-        (ELLIPSE + 'weights = [{ from = "400 deg", to = "500 deg", weight = 2 }]', "hold at least one target"),
+        (ELLIPSE + 'weights = [{ from = "50 deg", to = "40 deg", weight = 2 }]', "hold at least one target"),
         (ELLIPSE + 'weights = [{ from = "4 deg", to = "50 deg" }]', "task.weights[0].weight is missing"),
         (ELLIPSE + 'rotation = { from = "0 deg" }', "task.rotation.to is missing"),
         ('[task]\nkind = "timed-path"\npoints = [[0, 0], [1, 1]]', "there must be at least 3"),
@@ -376,11 +376,12 @@ def test_a_target_is_scaled_turned_and_shifted(tmp_path) -> None:
 
 def test_windows_weigh_what_is_within_their_ends(tmp_path) -> None:
     windows = (
-        'weights = [{ from = "60 deg", to = "90 deg", weight = 10 }, { from = "90 deg", to = "105 deg", weight = 3 }]\n'
+        'weights = [{ from = "60 deg", to = "90 deg", weight = 10 }, { from = "90 deg", to = "105 deg", weight = 3 },\n'
+        ' { from = "-15 deg", to = "15 deg", weight = 4 }, { from = "330 deg", to = "345 deg", weight = 5 }]\n'
     )
     weights = case(ELLIPSE + windows, tmp_path).task.weights
     expected = np.ones(24)
-    expected[4:6], expected[6:8] = 10.0, 3.0
+    expected[4:6], expected[6:8], expected[[0, 1]], expected[[22, 23]] = 10.0, 3.0, 4.0, 5.0
     np.testing.assert_array_equal(weights, expected)
     # of an untimed path, numbers of points
     untimed = f'[task]\nkind = "untimed-path"\npoints = {SQUARE}\nweights = [{{ from = 1, to = 2, weight = 5 }}]\n'

@@ -160,7 +160,8 @@ class TestQuickReturn:
     def test_links_may_be_fixed(self, task: syn.Task, fixed: dict[str, float]) -> None:
         best = syn.synthesize(task, {name: (x, x) for name, x in fixed.items()}, [syn.FullTurn()]).best
         assert {name: getattr(best.linkage, name) for name in fixed} == pytest.approx(fixed, rel=1e-8)
-        assert best.evaluation.worst < 1e-9 and best.verdicts.full_turn
+        assert best.evaluation.worst < 1e-9
+        assert best.verdicts.full_turn
 
     def test_what_cannot_be_had_is_said(self) -> None:
         with pytest.raises(syn.InfeasibleError, match=r"time ratio of 1.5 the best slider-crank has 27.46 deg"):

@@ -638,6 +638,11 @@ class TestBadInput:
             syn.synthesize(TASK, constraints=[*syn.USUAL, far, near], search=QUICK)
         with refused(r"no point in common: pivot_x is to be 0 to 500 mm, pivot_y", syn.InfeasibleError):
             syn.synthesize(TASK, {"pivot_x": (0.0, 0.5)}, constraints=[*syn.USUAL, far], search=QUICK)
+        # a shaft on a line or at a point of the region
+        for bounds in ({"pivot_x": (0.95, 0.95)}, {"pivot_x": (0.92, 0.92), "pivot_y": (0.95, 0.95)}):
+            best = syn.synthesize(TASK, bounds, constraints=[*syn.USUAL, far], search=QUICK).best.linkage
+            assert best.pivot_x == pytest.approx(bounds["pivot_x"][0])
+            assert 0.9 - 1e-6 < best.pivot_y < 1.9 - best.pivot_x + 1e-6
 
     def test_an_open_path_needs_rotations_to_be_compared(self) -> None:
         task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE[:9], closed=False))

@@ -136,7 +136,8 @@ def _rotation(value: Any, *targets: FloatArray) -> FloatArray | None:
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
     """Read the weights of targets, given as a list or as windows of crank rotations; see `Window`.
 
-    For an untimed task, with n targets, the windows are ranges of point indices. A window includes its ends.
+    For an untimed task, with n targets, the windows are ranges of point indices. A window includes its ends; one of crank
+    rotations holds in every turn, so that it may pass the start of the task.
     """
     if value is None:
         return None
@@ -149,9 +150,12 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     weights = np.ones(len(at))
     for k, row in enumerate(rows):
         window = read(Window, row, f"{name}[{k}]", readers=numbers)
-        within = (at >= window.begin - 1e-9) & (at <= window.end + 1e-9)
+        after = at - window.begin + 1e-9
+        if rotation is not None:
+            after %= tau
+        within = (after >= 0.0) & (after <= window.end - window.begin + 2e-9)
         if not within.any():
-            raise ParameterError(f"{name}[{k}]", dict(row), "hold at least one target")
+            raise ParameterError(f"{name}[{k}]", dict(row), "hold at least one target, with 'from' below 'to'")
         weights[within] = window.weight
     return weights
 

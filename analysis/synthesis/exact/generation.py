@@ -514,7 +514,7 @@ def _best_coupler(
     couplers = np.linspace(*ends, COUPLERS)
     values = np.array([margins(float(l3)) for l3 in couplers])
     reached = [
-        brentq(lambda l3: margins(l3)[m], *couplers[k : k + 2], xtol=1e-15 * ends[1])
+        brentq(lambda l3, m=m: margins(l3)[m], *couplers[k : k + 2], xtol=1e-15 * ends[1])
         for k, m in zip(*np.nonzero(values[:-1] * values[1:] < 0.0))
     ]
     couplers = np.sort(np.append(couplers, reached))

@@ -383,10 +383,11 @@ def complete_bounds(
 
 def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, constraints: Sequence[Constraint]) -> None:
     """Check that the coupler point can span the target: its distance from A is at most crank plus point distance."""
-    from shapely import MultiPoint, Polygon, box
+    from shapely import MultiPoint, Polygon
 
     (left, right), (bottom, top) = given["pivot_x"], given["pivot_y"]
-    room = box(left, bottom, right, top)
+    # a line or a point where bounds fix the place
+    room = MultiPoint([(x, y) for x in (left, right) for y in (bottom, top)]).convex_hull
     for c in constraints:
         if isinstance(c, PivotRegion) and c.pivot == "A":
             room = room.intersection(Polygon(c.polygon))
