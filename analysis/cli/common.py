@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 import sys
+import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from itertools import repeat
 from pathlib import Path
@@ -287,15 +288,12 @@ def case_options(published: Iterable[str]) -> Callable[..., Any]:
     return lambda command: case(option(setting(command)))
 
 
-def number_or_text(text: str) -> bool | int | float | str:
-    """Convert a text of the command line to a truth value or a number, if possible; return any other text unchanged."""
-    if text in ("true", "false"):
-        return text == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
+def value_of(text: str) -> Any:
+    """Convert a text of the command line to a value: of TOML, as in a case file, or a number; any other text stays a text."""
+    with suppress(ValueError, RecursionError):
+        return tomllib.loads(f"value = {text}")["value"]
+    with suppress(ValueError):
+        return float(text)
     return text
 
 
@@ -370,20 +368,17 @@ def quantity(text: str, unit: str, option: str) -> float:
     """Return the value of an option in SI, from a text such as "420 rpm" or a number without unit, which is in SI."""
     from .. import units
 
-    return units.quantity(number_or_text(text), unit, option)
+    return units.quantity(value_of(text), unit, option)
 
 
-def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Return the new values that the options ``--set NAME=VALUE`` give, by name.
-
-    ``read`` converts the text of a value; ``example`` is an example for error messages.
-    """
+def changes(settings: Sequence[str], example: str) -> dict[str, Any]:
+    """Return the new values that the options ``--set NAME=VALUE`` give, by name; ``example`` is for error messages."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not equals or not name.strip():
             raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as {example}")
-        values[name.strip()] = read(text.strip())
+        values[name.strip()] = value_of(text.strip())
     return values
 
 
@@ -396,7 +391,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
-    overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
+    overrides = changes(settings, "slider.stiffness='2e6 dyn/cm'")
     if not runs and (file or overrides) and "run.revolutions" not in overrides:
         overrides = {"run.stop_time": 1.0} | overrides
     if file is not None:

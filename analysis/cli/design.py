@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,18 +21,6 @@ if TYPE_CHECKING:
 
 #: Number of further positions of the linkage that a drawing shows.
 POSES = 6
-
-
-def read_settings(settings: Sequence[str]) -> dict[str, Any]:
-    """Return the new values of entries of a case file, given as NAME=VALUE; a value that is not TOML is taken as text."""
-
-    def value(text: str) -> Any:
-        try:
-            return tomllib.loads(f"value = {text}")["value"]
-        except (ValueError, RecursionError):
-            return text
-
-    return common.changes(settings, value, "constraints.largest_link='300 mm'")
 
 
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
@@ -65,7 +52,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def read_overrides(settings: Sequence[str], **options: Any) -> dict[str, Any]:
     """Return the new values of entries of a case file, from ``--set`` and from other options, ``table__name=value``."""
     given = {name.replace("__", "."): value for name, value in options.items() if value is not None}
-    return read_settings(settings) | given
+    return common.changes(settings, "constraints.largest_link='300 mm'") | given
 
 
 def print_solutions(

@@ -122,7 +122,7 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
 
     given = {
         **flatten(read_tables(file) if file else {}),
-        **common.changes(settings, common.number_or_text, "drive.speed='420 rpm'"),
+        **common.changes(settings, "drive.speed='420 rpm'"),
     }
     speeds = [name for name, acting in case_inputs(find_mechanism(case.parameters)).items() if acting.unit == "rad/s"]
     return [
@@ -511,7 +511,7 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
             for sentence in about[number]:
                 common.say(f"{'':>10}{sentence}")
         return
-    values = common.changes(settings, common.number_or_text, "rod.length='45 in'")
+    values = common.changes(settings, "rod.length='45 in'")
     if values and not numbers:
         raise click.UsageError("name the figures whose mechanism --set changes, such as linkwork figures R5 --set ...")
     for number in numbers:

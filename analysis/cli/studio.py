@@ -57,7 +57,7 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     from ..files import write_text
     from ..studio import make_page
 
-    page = make_page(_state(what, common.changes(settings, common.number_or_text, "slider.stiffness='2e6 dyn/cm'")))
+    page = make_page(_state(what, common.changes(settings, "slider.stiffness='2e6 dyn/cm'")))
     if out is not None:
         common.say(f"wrote {write_text(out, page)}")
         return

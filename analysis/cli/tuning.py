@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from . import common
-from .design import read_settings
 
 
 @click.command()
@@ -39,7 +38,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     from ..tuning import load_tuning_case
     from ..tuning import tune as find
 
-    overrides = read_settings(settings)
+    overrides = common.changes(settings, 'tune.speeds=\'["1150 rpm", "1190 rpm"]\'')
     common.check_kind(case, common.TUNING, settings=overrides)
     chosen = load_tuning_case(case, overrides)
     tuned = find(chosen.wish, progress=common.console.is_terminal)

@@ -213,6 +213,15 @@ def test_info_has_the_names_of_sets_parameters_and_case_files(linkwork, tmp_path
     assert all(name in result.output for name in names)
 
 
+def test_values_of_set_are_those_of_a_case_file(linkwork):
+    section = 'crank.section={kind = "rod", diameter = "12 mm", material = "steel"}'
+    result = linkwork("run", "--published", "table-3.1", "--no-plot", "--set", "drive.speed=.5e2", "--set", section)
+    assert result.exit_code == 0, result.stderr
+    # 7850 kg/m3 pi/4 (12 mm)^2 50 mm, and 50 rad/s
+    assert "crank.mass 0.04439 kg (of a rod of 12 mm" in result.output
+    assert " 477.465 " in result.output
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_info_on_every_kind_of_fmu_shows_starts_alike(linkwork, kind, tmp_path):
     with ZipFile(tmp_path / "some.fmu", "w") as archive:

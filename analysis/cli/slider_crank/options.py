@@ -28,9 +28,9 @@ from ..common import (
     check_kind,
     in_units,
     note,
-    number_or_text,
     quantity,
     report_errors,
+    value_of,
 )
 
 if TYPE_CHECKING:
@@ -166,10 +166,10 @@ def _choose(
         start, pace = case.initial.shift_position, case.crank_speed
     else:
         raise unknown_name(name, SETS, f"published case {name!r}")
-    values = changes(settings, number_or_text, "rod.length='45 in'")
+    values = changes(settings, "rod.length='45 in'")
     for key, text in (("guide.offset", offset), ("guide.twist", twist)):
         if text is not None:
-            values[key] = number_or_text(text)
+            values[key] = value_of(text)
     if shift is not None:
         if groove is not None:
             raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
