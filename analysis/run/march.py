@@ -222,6 +222,14 @@ class March:
 
         return Ending
 
+    def _clearance(self, x: NDArray[np.float64]) -> float:
+        """Return how far a state is from the limit of assembly; it is negative beyond."""
+        try:
+            found = float(self.equations.clearance(tuple(x), self.held, self.of.p) - LIMIT_SINE)
+        except (ArithmeticError, ValueError):
+            return -1.0
+        return -1.0 if np.isnan(found) else found
+
     def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
         """Return the outputs at a state; all are NaN if the equations have no value there, for example a spring's law."""
         try:
@@ -272,6 +280,9 @@ class March:
                 self.occurrences.append(Occurrence(event.name, t, tuple(x[:-2].tolist())))
         # SciPy returns empty lists if an event comes before the first of the times
         for t, x in zip(solution.t, np.ascontiguousarray(np.asarray(solution.y).T)):
+            if self._clearance(x) < 0.0:  # a step passed over the limit, and no event was seen
+                self.t, self.x, self.status = *(self.rows[-1][:2] if self.rows[-1][0] > t0 else (t0, x0)), k.LIMIT
+                return False
             if t < stop:
                 self.rows.append((float(t), x, self._inputs(t, x, stop)))
         what: What = None
@@ -312,10 +323,7 @@ class March:
         """Return events and their functions for `solve_ivp`: limit of assembly, release of torsion bars, events of the user."""
 
         def limit(t: float, x: NDArray[np.float64]) -> float:
-            try:
-                return float(self.equations.clearance(tuple(x), self.held, self.of.p) - LIMIT_SINE)
-            except (ArithmeticError, ValueError):
-                return -1.0
+            return self._clearance(x)
 
         def unwound(n: int) -> Callable[[float, NDArray[np.float64]], float]:
             def value(t: float, x: NDArray[np.float64]) -> float:

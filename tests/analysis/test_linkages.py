@@ -1355,3 +1355,11 @@ def test_no_step_passes_over_a_limit_of_assembly(
 ) -> None:
     mechanism, limit = level_four_bar(coupler, mass)
     assert limit - 0.01 * math.pi < run(mechanism, tmp_path) < limit + 1e-6
+
+
+def test_a_method_of_scipy_says_that_it_passed_over_a_limit_of_assembly() -> None:
+    mechanism, limit = level_four_bar(0.19999, 0.0)
+    run = simulate(mechanism.name, method="RK45", stop_time=0.3)
+    assert run.status == 3
+    assert limit - 0.02 * math.pi < run["crank.angle"][-1] < limit + 1e-6
+    assert all(np.isfinite(run[name]).all() for name in run.names)
