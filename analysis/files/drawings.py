@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from io import StringIO
-from math import atan2, cos, degrees, hypot, isfinite, radians, sin
+from math import atan2, cos, degrees, floor, hypot, isfinite, log10, radians, sin
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -238,8 +238,12 @@ def _unit_length(unit: str, known: Iterable[str]) -> float:
 
 
 def _label(dimension: Dimension, metre: float) -> str:
-    """Return the number of a dimension as text, rounded to hundredths of the unit; ``metre`` is the length of the unit (m)."""
-    return f"{round(dimension.length / metre, 2):g}"
+    """Return the number of a dimension as text; ``metre`` is the length of the unit (m).
+
+    It is rounded to 0.01 mm, or to four digits if it is shorter than 10 mm.
+    """
+    step = min(1e-5, 10.0 ** (floor(log10(dimension.length)) - 3))
+    return np.format_float_positional(round(dimension.length / metre, round(log10(metre / step) + 0.49)), trim="-")
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:

@@ -267,3 +267,20 @@ def test_what_cannot_be_drawn_is_refused(build: Any, message: str) -> None:
 def test_unknown_layers_are_refused() -> None:
     with pytest.raises(UnknownNameError, match=r"'cranc'.* crank"):
         Drawing(layers=LAYERS, title="", lines=(Line(layer="cranc", start=(0.0, 0.0), end=(1.0, 1.0)),))
+
+
+@pytest.mark.parametrize(
+    ("length", "unit", "number"),
+    [
+        (0.0485486, "mm", "48.55"),
+        (0.0485486, "m", "0.04855"),
+        (0.4257e-3, "mm", "0.4257"),
+        (0.6, "mm", "600"),
+        (425.7390851, "mm", "425739.09"),
+    ],
+)
+def test_the_number_of_a_dimension_is_as_exact_in_every_unit(length: float, unit: str, number: str) -> None:
+    dimension = Dimension(layer="dimension", start=(0.0, 0.0), end=(length, 0.0), offset=length, height=0.1 * length)
+    way = Line(layer="crank", start=dimension.start, end=dimension.end)
+    drawn = read_dxf(to_dxf(Drawing(layers=LAYERS, title="a way", lines=(way,), dimensions=(dimension,)), unit))
+    assert [e.dxf.text for e in drawn.query("DIMENSION")] == [number]
