@@ -6,13 +6,16 @@ evenly spaced positions of a turn, finds the equilibrium of all free coordinates
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
+from linkwork.integrate import UNDEFINED
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
@@ -130,7 +133,7 @@ def natural_modes(
     InputError
         If an input is not constant, or no coordinate other than the held crank is free.
     AssemblyError, EquilibriumError
-        If the links cannot be joined at a position, or no equilibrium is found there.
+        If the links cannot be joined at a position or come to the limit of assembly between two, or no equilibrium is found.
 
     Examples
     --------
@@ -159,14 +162,37 @@ def natural_modes(
     start = np.array(mechanism.state(initial)[: len(mechanism.freedoms)])
     period = common_period(mechanism, speeds)
     found: list[Equilibrium] = []
-    for time in period * np.arange(samples if period else 1) / samples:
+    # the last position closes the turn
+    for time in period * np.arange(samples + 1 if period and samples > 1 else 1) / samples:
         held = {mechanism.freedoms[n].coordinate: start[n] + speed * time for n, speed in speeds.items()}
         guess = found[-1].coordinates if found else start
         found.append(find_equilibrium(parameters, still, held=held, guess=guess))
+    for one, other in pairwise(found):
+        _check_between(mechanism, one, other)
+    del found[samples:]
     states = np.array([one.state for one in found])
     modes, channels = sample_channels(mechanism, found[0].inputs, np.zeros(len(found)), states)
     matrices = Matrices(parameters=parameters, modes=modes, **evaluate(parameters, modes, states, channels))
     return _decompose(tuple(found), matrices)
+
+
+def _check_between(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> None:
+    """Raise AssemblyError if the links come to the limit of assembly on the straight way between two equilibria."""
+    from scipy.optimize import minimize_scalar
+
+    p = one.parameters.constants()
+    idle, begin, end = mechanism.idle_inputs(p), np.array(one.state), np.array(other.state)
+
+    def state(share: float) -> list[float]:
+        return list((begin + share * (end - begin)).tolist())
+
+    def clearance(share: float) -> float:
+        with suppress(*UNDEFINED):
+            return float(mechanism.equations.clearance(state(share), idle, p))
+        return 0.0
+
+    least = minimize_scalar(clearance, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-6})
+    mechanism.check_assembly(state(least.x), p)
 
 
 def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int, float]:
