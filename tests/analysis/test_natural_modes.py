@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from analysis import Inputs, natural_frequency, natural_modes, ramp
 from analysis.linear import linearise
 from analysis.linkages import linkage
-from analysis.periodic import Drive, basins, default_range
+from analysis.periodic import Drive, basins, default_range, find_orbits
 from analysis.run import load_case
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import SETS
@@ -194,7 +194,7 @@ def test_a_chart_has_a_range_of_speeds_without_a_natural_frequency() -> None:
     assert default_range(locked, Drive(speed=30.0), "drive.speed") == pytest.approx((3.0, 60.0))
 
 
-def test_no_position_is_taken_beyond_a_change_point() -> None:
+def test_no_position_or_motion_is_taken_beyond_a_change_point() -> None:
     # a level parallelogram, with a pendulum on its coupler, folds at 0 and 180 deg, between two positions
     built = linkage("folding-parallelogram", ground={"A": (0, 0), "D": (0.2, 0)}, gravity=9.81)
     built.body("crank", bar=("A", "B"), length=0.05, mass=0.1, inertia=1e-4)
@@ -206,3 +206,4 @@ def test_no_position_is_taken_beyond_a_change_point() -> None:
     assert natural_modes(mechanism.name, samples=1).frequencies.shape == (1, 1)
     with pytest.raises(AssemblyError, match=r"at crank angle 3\.14"):
         natural_modes(mechanism.name)
+    assert "the links come to the limit of assembly" in find_orbits(mechanism.name, speed="100 rpm").reason

@@ -418,7 +418,10 @@ def basins(
     motions = found.stable
     if not motions:
         of, also = describe_turns(drive.flow(find_mechanism(parameters)), turns), unsought_hint(parameters, drive)
-        raise InputError(f"no stable motion of {of} was found here, so that there are no basins{also}")
+        raise InputError(
+            f"no stable motion of {of} was found here, so that there are no basins{also}"
+            + (found.reason and f": {found.reason}")
+        )
     if coordinate is None and position is None and rate is None:
         place = _most_different([_path(orbit) for orbit in motions], motions[0].scale)
     default = _default_plane(parameters, drive, motions[0], np.vstack([_path(orbit) for orbit in found.orbits]), place)

@@ -270,12 +270,15 @@ class Orbits(NotebookResult):
     index_of_all : int
         Value of ``index`` if no motion is missing: 1; or 0 if a link may go round, because motions then come in pairs, like a
         hanging and an inverted pendulum.
+    reason : str
+        Why Newton's method found no motion from the first guess, such as a limit of assembly; empty if a motion was found.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
     agreed: bool
     index: int
     index_of_all: int
+    reason: str = ""
 
     def __len__(self) -> int:
         return len(self.orbits)
@@ -284,6 +287,8 @@ class Orbits(NotebookResult):
         return iter(self.orbits)
 
     def __repr__(self) -> str:
+        if not self.orbits:
+            return f"<Orbits: {self.reason or 'no periodic motions'}>"
         words = [orbit.verdict().stability.value for orbit in self.orbits]
         what = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
         sure = "" if self.agreed else "; there may be more"
@@ -533,8 +538,14 @@ def _search_rounds(
             many.add(orbit)
             deflated.add(orbit)
         places = [*many.places(MANY, number + 1), *many.intermediate_starts()]
-    orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
-    return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole)
+    orbits, reason = sorted(many.orbits, key=lambda orbit: orbit.amplitude), ""
+    if not orbits:
+        try:
+            solve_orbit(point, turns, guess)
+        except OrbitError as error:
+            reason = str(error)
+    sure = agreed and many.index == whole
+    return Orbits(orbits=tuple(orbits), agreed=sure, index=many.index, index_of_all=whole, reason=reason)
 
 
 def join_orbits(parts: Sequence[Orbits]) -> Orbits:
@@ -545,6 +556,7 @@ def join_orbits(parts: Sequence[Orbits]) -> Orbits:
         agreed=all(part.agreed for part in parts),
         index=next((part.index for part in parts if part.index != whole), whole),
         index_of_all=whole,
+        reason="" if any(part.orbits for part in parts) else parts[0].reason,
     )
 
 
