@@ -177,12 +177,13 @@ def fit_decay(
     places, reach = range(len(turns)), half * _WINDOW
     found = _fit(np.array([_turning_point(t, x, turn, reach) for turn in turns]), friction)
     for _ in range(_ROUNDS if friction else 1):
-        # read at evenly spaced times: noise moves the vertex of a parabola outwards, which would lessen the decrement
-        line = np.polyval(np.polyfit(places, found.time, 1, w=np.abs(found.fitted - found.offset)), places)
+        # read at smoothed times: noise moves the vertex of a parabola outwards, which would lessen the decrement
+        order = min(3, len(turns) // 3)  # the period of a nonlinear oscillation changes with its amplitude
+        smooth = np.polyval(np.polyfit(places, found.time, order, w=np.abs(found.fitted - found.offset)), places)
         jumps = np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0)
         tops = [
             (_turning_point(t, x, turn, reach, jump)[0], _turning_point(t, x, turn, reach, jump, time)[1])
-            for turn, jump, time in zip(turns, jumps, line)
+            for turn, jump, time in zip(turns, jumps, smooth)
         ]
         found = _fit(np.array(tops), friction)
     return found

@@ -1,12 +1,13 @@
 """Damping and natural frequency from a decaying record, against the exact motion of a mass on a spring."""
 
-from math import exp, pi, sqrt
+from math import exp, pi, sin, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from analysis.cli import main
 from analysis.numerics.decay import fit_decay
@@ -56,6 +57,19 @@ def test_a_clean_record(offset: float, sign: float) -> None:
 def test_uneven_times() -> None:
     t = np.sort(np.random.default_rng(2).uniform(0.0, 0.8, 3000))
     assert fit_decay(t, free(t)).damping(MASS)[0] == pytest.approx(DAMPING, rel=1e-3)
+
+
+def test_turning_points_of_a_pendulum_whose_period_changes() -> None:
+    def rates(_: float, y: NDArray[np.float64]) -> list[float]:
+        return [y[1], -0.12 * y[1] - 40.0 * sin(y[0])]
+
+    def rate(_: float, y: NDArray[np.float64]) -> float:
+        return float(y[1])
+
+    t = np.linspace(0.0, 20.0, 4001)
+    run = solve_ivp(rates, (0.0, 20.0), [1.0, 0.0], t_eval=t, events=rate, rtol=1e-9, atol=1e-12)
+    found, known = fit_decay(t, run.y[0]).position, run.y_events[0][:, 0]
+    assert found == pytest.approx(known[np.abs(known - found[0]).argmin() :][: len(found)], rel=0.01)
 
 
 @pytest.mark.parametrize(("size", "count"), [(0.003, 4001), (0.01, 4001), (0.02, 181)])
