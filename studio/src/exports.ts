@@ -21,6 +21,11 @@ function written(number: number): string {
   return /^-?\d+$/.test(text) ? `${text}.0` : text;
 }
 
+/** A value of the case in SI: an angle has its unit, as a number alone of four turns or more is refused. */
+function quantity(given: Given, now: number): string {
+  return given.unit === "deg" ? `"${now} rad"` : written(now);
+}
+
 /** The case as `linkwork run` reads it. */
 export function caseText(m: Mechanism, state: State, duration: number): string {
   const which = m.described
@@ -52,7 +57,7 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
       if (!inputs.some((g) => g.argument === flag)) lines.push(`${given.name.split(".")[0]}.${flag} = true`);
     } else if (given.argument === undefined) {
       if (!idle.has(given.reference))
-        lines.push(`${given.name} = ${given.choices ? String(now) : written(now)}`);
+        lines.push(`${given.name} = ${given.choices ? String(now) : quantity(given, now)}`);
     } else if (chosen.includes(given.argument)) lines.push(`${given.file!} = ${acting(given, now)}`);
     else if (now !== 0 && !modes.some((mode) => mode.arguments!.includes(given.argument!)))
       lines.push(`${given.file!} = ${written(now)}`);

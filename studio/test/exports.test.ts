@@ -18,6 +18,12 @@ test("a case has what acts, and no more", () => {
   assert.ok(pushed.includes("drive.torque = 0.5"));
   assert.ok(pushed.includes("initial.speed = 2.0"));
   assert.ok(!pushed.some((line) => line.startsWith("drive.speed")));
+  // after many turns
+  assert.ok(
+    caseText(WHEEL, { ...STATE, values: { "initial.angle": 50.5 } }, 2).includes(
+      'initial.angle = "50.5 rad"',
+    ),
+  );
   // the mechanism, or the file that describes it
   assert.equal(driven[0], 'mechanism = "wheel"');
   assert.match(caseText({ ...WHEEL, described: true }, STATE, 2), /^linkage = "wheel\.toml" {2}# .*\ntitle/);

@@ -20,7 +20,7 @@ export const WHEEL: Mechanism = {
       choices: { "0": "torque", "1": "speed" },
       arguments: ["torque", "speed"],
     },
-    { ...plain, name: "initial.angle", reference: 2, start: 0 },
+    { ...plain, name: "initial.angle", unit: "deg", factor: 180 / Math.PI, reference: 2, start: 0 },
     { ...plain, name: "initial.speed", reference: 3, start: 2 },
     { ...input, name: "drive.torque", reference: 4, file: "drive.torque", argument: "torque", kind: "force" },
     { ...input, name: "drive.speed", reference: 5, file: "drive.speed", argument: "speed", kind: "command" },
