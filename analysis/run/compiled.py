@@ -155,7 +155,7 @@ def next_size(carry, size):
 def _bounded_size(motion):
     """Return the proposed step size, shortened so that the step passes over no force and no limit of assembly."""
     x, room = motion.x, motion.room
-    h = bounded_step_size(motion.carry.step, room.k[0], motion.problem.reach, 0, 1)
+    h = bounded_step_size(motion.carry.step, room.k[0], motion.problem.reach, motion.scale, 0, 1)
     for i in range(x.shape[0]):
         room.z[i] = x[i] + PROBE * h * room.k[0, i]
     clearance = state_clearance(x, motion.u, motion)

@@ -266,7 +266,7 @@ def _choose_sizes(v, w):
                 read_lane(lane, LANES, v.z, w.room.k[0])
                 write_lane(lane, LANES, w.room.k[0], v.k[0])
                 choose_first_size(_motion(i, w))
-            v.h[lane] = bounded_step_size(carry.step, v.k[0], w.problem.reach, lane, LANES)
+            v.h[lane] = bounded_step_size(carry.step, v.k[0], w.problem.reach, v.scale, lane, LANES)
             carry.steps += 1
     for j in range(v.x.shape[0]):
         v.z[j] = v.x[j] + PROBE * v.h[j % LANES] * v.k[0, j]

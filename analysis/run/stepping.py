@@ -90,12 +90,12 @@ def leading_error(n, x, y, k, h, scale, lane, lanes):
 
 
 @inner
-def bounded_step_size(h, rates, reach, lane, lanes):
-    """Return a step size, shortened so that no component of the state, at its rate, changes by more than its reach."""
+def bounded_step_size(h, rates, reach, scale, lane, lanes):
+    """Return a step size, shortened so that no component, at its rate, changes by more than its reach times its scale."""
     for i in range(reach.shape[0]):
-        rate = abs(rates[i * lanes + lane])
-        if h * rate > reach[i]:
-            h = reach[i] / rate
+        rate, most = abs(rates[i * lanes + lane]), reach[i] * scale[i * lanes + lane]
+        if h * rate > most:
+            h = most / rate
     return h
 
 

@@ -141,7 +141,8 @@ def integrate(
     step : float
         First step size to try, such as `Result.step` of the previous interval; if 0, the integrator chooses.
     reach : tuple of float
-        Largest change of each component in a step, as far as its rate at the beginning of the step tells; any change if empty.
+        Largest change of each component relative to its scale in a step, as far as its rate at the beginning of the step
+        tells; any change if empty.
     clearance : callable, optional
         Distance of a state from a limit, which a step at most halves, as far as its rate at the beginning of the step tells.
     accept : callable, optional
@@ -163,7 +164,7 @@ def integrate(
     proposal = step
     while True:
         remaining = duration - done
-        size = bounded_step(proposal, k1, reach)
+        size = bounded_step(proposal, k1, reach, scale)
         if clearance is not None:
             size = _step_short_of_limit(size, x, k1, clearance)
         last = size >= remaining * (1.0 - 1e-10)
@@ -206,11 +207,11 @@ def integrate(
                 )
 
 
-def bounded_step(step: float, rates: Vector, reach: Vector) -> float:
-    """Return a step size, shortened so that no component of the state, at its rate, changes by more than its ``reach``."""
-    for rate, most in zip(rates, reach):
-        if step * abs(rate) > most:
-            step = most / abs(rate)
+def bounded_step(step: float, rates: Vector, reach: Vector, scale: Vector) -> float:
+    """Return a step size, shortened so that no component, at its rate, changes by more than its reach times its scale."""
+    for rate, most, size in zip(rates, reach, scale):
+        if step * abs(rate) > most * size:
+            step = most * size / abs(rate)
     return step
 
 

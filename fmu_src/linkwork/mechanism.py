@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from math import degrees, inf, pi
+from math import degrees, inf, pi, radians
 from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
@@ -316,8 +316,9 @@ class Mechanism:
     unjoined : UnjoinedMessages or None
         Messages of this AssemblyError, also used by the FMU in C; None if the links can always be joined.
     greatest_rotation : float
-        Largest change of an angle among the freedoms in a step of the integrator (rad), so that no step passes over a force
-        that acts over a small angle only, and none over a limit of assembly; infinite if there is neither.
+        Largest change of an angle among the freedoms in a step of the integrator (rad), and of a translation relative to its
+        ``error_scale``, so that no step passes over a force that acts over a small angle only, and none over a limit of
+        assembly; infinite if there is neither.
     switch : str
         Name of the only constant on which the equations may branch: they may differ between zero and positive values of this
         constant. The equations are traced once for each of the two cases, so that terms that are switched off cost nothing.
@@ -348,7 +349,7 @@ class Mechanism:
     check_assembly: Callable[[Sequence[float], Any], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     unjoined: UnjoinedMessages | None = None
-    greatest_rotation: float = inf
+    greatest_rotation: float = radians(45.0)
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
@@ -372,10 +373,8 @@ class Mechanism:
 
     @cached_property
     def reach(self) -> tuple[float, ...]:
-        """Return the largest change of each component of the state in a step of the integrator: see ``greatest_rotation``."""
-        units = {variable.name: variable.unit for variable in self.variables}
-        angles = (self.greatest_rotation if units[freedom.coordinate] == "rad" else inf for freedom in self.freedoms)
-        return (*angles, *[inf] * (len(self.freedoms) + 2))
+        """Return the largest change of each component of the state, relative to its ``error_scale``, in a step."""
+        return (*[self.greatest_rotation] * len(self.freedoms), *[inf] * (len(self.freedoms) + 2))
 
     @property
     def first_set(self) -> PublishedSet:

@@ -69,7 +69,7 @@ TABLE const FreedomName freedoms[FREEDOMS];
 TABLE const Variable variables[VARIABLES];
 TABLE const int parameter_at[ROOM(PARAMETERS)], initial_at[2 * FREEDOMS], mode_at[ROOM(MODES)], input_at[ROOM(INPUTS)];
 TABLE const int state_at[STATES];
-TABLE const double reach[STATES]; /* largest change in a step of the integrator */
+TABLE const double reach[STATES]; /* largest change in a step of the integrator, relative to the scale */
 TABLE const int tolerance_at, status_at, message_at;
 TABLE const Command commands[ROOM(COMMANDS)];
 TABLE const Least least[ROOM(BOUNDS)];

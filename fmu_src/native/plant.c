@@ -344,12 +344,12 @@ static double first_step(const Plant *a, const double x[STATES], const double sl
     return ratio == 0.0 ? duration : fmin(duration, pow(a->tolerance, 1.0 / ORDER) / ratio);
 }
 
-/* The step, shortened so that no angle of a freedom, at its rate, turns by more than its reach, and the clearance falls by no
-   more than half. */
+/* The step, shortened so that no freedom, at its rate, moves by more than its reach, and the clearance falls by no more than
+   half. */
 static double bounded_step(const Plant *a, double step, const double x[STATES], const double slope[STATES]) {
     double ahead[STATES];
     for (int i = 0; i < STATES; i++)
-        if (step * fabs(slope[i]) > reach[i]) step = reach[i] / fabs(slope[i]);
+        if (step * fabs(slope[i]) > reach[i] * a->scale[i]) step = reach[i] * a->scale[i] / fabs(slope[i]);
     for (int i = 0; i < STATES; i++) ahead[i] = x[i] + PROBE * step * slope[i];
     double clearance = state_clearance(a, x), fall = clearance - state_clearance(a, ahead);
     if (isnan(fall)) return PROBE * step; /* beyond the limit */

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from analysis import figures, variant
+from analysis import figures, steps, variant
 from analysis.export import NATIVE, build_native
 from analysis.files import entry_names
 from analysis.linear import linearise
@@ -27,7 +27,7 @@ from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.parameters import spring_angle_name
 from analysis.linkages.structure import Pin, Slider
-from analysis.mechanisms import check
+from analysis.mechanisms import MECHANISMS, check
 from analysis.periodic import (
     Drive,
     find_orbit,
@@ -44,6 +44,8 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterE
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
+from linkwork.slider_crank.parameters import InitialState as SliderCrankState
+from linkwork.slider_crank.parameters import SliderCrankParameters
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
 
@@ -1363,3 +1365,44 @@ def test_a_method_of_scipy_says_that_it_passed_over_a_limit_of_assembly() -> Non
     assert run.status == 3
     assert limit - 0.02 * math.pi < run["crank.angle"][-1] < limit + 1e-6
     assert all(np.isfinite(run[name]).all() for name in run.names)
+
+
+def _pusher() -> tuple[Any, Any, str, float]:
+    """A dyad without mass that a block pushes, and the position of the block at which its bodies are in line."""
+    built = linkage("pusher", ground={"O": (0, 0), "D": (0.0, 0.05)}, assembly={"C": 1})
+    built.body("block", points={"B": (0, 0)}, mass=1.0).slide("G", body="block", through="O")
+    built.body("rod", bar=("B", "C"), length=0.2).body("rocker", bar=("D", "C"), length=0.1)
+    known = built.freedom("push", "G", speed=1.0, start=-0.22).mechanism().first_set
+    return known.parameters, known.initial, "push.position", -math.sqrt(0.1**2 - 0.05**2)
+
+
+def _light_slider_crank() -> tuple[Any, Any, str, float]:
+    """A slider-crank whose crank alone has a mass and is longer than the rod; its guide is through the crank axis."""
+    made = SliderCrankParameters(
+        crank_length=0.12, rod_length=0.119, guide_twist=math.pi / 2.0, crank_mass=1.0, crank_inertia=0.01
+    )
+    return made, SliderCrankState(crank_angle=1.05), "crank.angle", math.pi - math.acos(0.119 / 0.12)
+
+
+def _light_five_bar() -> tuple[Any, Any, str, float]:
+    """A level five-bar whose coupler and rocker have no mass, so that the slider remains at rest."""
+    known = MECHANISMS["five-bar"].first_set
+    lengths = {"ground_length": 0.2, "crank_length": 0.05, "coupler_length": 0.2, "rocker_length": 0.0499}
+    light = dict.fromkeys(("coupler_mass", "rocker_mass", "coupler_inertia", "rocker_inertia", "slider_stiffness"), 0.0)
+    made = replace(known.parameters, slider_mass=1.0, **lengths, **light)
+    cosine = (0.2**2 + 0.05**2 - (0.2 + 0.0499) ** 2) / (2.0 * 0.2 * 0.05)
+    return made, replace(known.initial, crank_angle=0.3), "crank.angle", math.acos(cosine)
+
+
+@pytest.mark.parametrize("make", [_pusher, _light_slider_crank, _light_five_bar])
+@pytest.mark.parametrize("many", [False, True])
+def test_no_step_passes_over_a_limit_after_a_rest(make: Callable[[], tuple[Any, Any, str, float]], many: bool) -> None:
+    parameters, initial, name, limit = make()
+    for speed in (1.0, 1.5, 100.0, 700.0):
+        inputs = Inputs(speed=steps([0.0, 1.0], [0.0, speed]))
+        if many:
+            run = simulate_many([parameters] * 9, inputs, initial=initial, stop_time=6.0)[8]
+        else:
+            run = simulate(parameters, inputs, initial=initial, stop_time=6.0)
+        assert "limit of assembly" in run.message
+        assert limit - 1e-3 * speed - 1e-3 < run[name][-1] < limit + 1e-6

@@ -142,7 +142,7 @@ static bool across(double from, double to, double z[], const double scale[], int
         double h = fmin(fmin(*proposal, reach[CRANK < 0 ? 0 : CRANK]), whole - done);
         if (!slope(NULL, from + done, z, k, length)) return false;
         for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
-            if (h * fabs(k[i]) > reach[section.place[i]]) h = reach[section.place[i]] / fabs(k[i]);
+            if (h * fabs(k[i]) > reach[section.place[i]] * scale[i]) h = reach[section.place[i]] * scale[i] / fabs(k[i]);
         bool last = h >= whole - done;
         double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;
         *proposal = fmax(error <= 1.0 && h < *proposal ? *proposal : 0.0, h * step_factor(error));
