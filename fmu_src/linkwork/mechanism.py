@@ -349,7 +349,7 @@ class Mechanism:
     check_assembly: Callable[[Sequence[float], Any], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     unjoined: UnjoinedMessages | None = None
-    greatest_rotation: float = radians(45.0)
+    greatest_rotation: float = radians(60.0)
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
