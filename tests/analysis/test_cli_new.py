@@ -23,7 +23,7 @@ QUICK = ("--set", "search.candidates=2048", "--set", "search.starts=3", "--no-pl
 SLIDER, TUNING = "slider-motion", "tuning"
 #: What is said of entries that are right by themselves, but exclude or need one another.
 TOGETHER = (
-    r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
+    r"must (have only one of|(not )?come (together|with)|be given with)|parameter drive.speed is missing"
     r"|a (four-bar|slider-crank) cannot keep (Stroke|Grashof|MechanicalAdvantage|DeadCentre|(No)?Toggle|MaxPinForce)"
     r"|kinds must be|it is for a slider-crank|must be given by one of|has no effect"
     r"|rests twice in a turn|come to a toggle cannot turn fully|needs crank rotations, and the task gives none"

@@ -349,7 +349,7 @@ def swapped(mechanism: Mechanism, name: str, **changes: Any) -> tuple[Any, ...]:
 #: What a mechanism's author may get wrong: the field with its wrong value, and what is said.
 FAULTS: dict[str, tuple[str, Any, str]] = {
     "unit": ("variables", swapped(ROTOR, "cart.position", unit="metre"), "cart.position has unit = 'metre'"),
-    "causality": ("variables", swapped(ROTOR, "cart.position", causality="out"), "the causality 'out'"),
+    "causality": ("variables", swapped(ROTOR, "cart.position", causality="out"), "has causality = 'out'"),
     "local": ("variables", swapped(ROTOR, "cart.position", causality="local"), "must be parameter or input or output"),
     "status": ("variables", swapped(ROTOR, "solver.status", causality="output"), "'output': it must be local"),
     "rate of nothing": ("variables", swapped(ROTOR, "cart.acceleration", rate_of="cart.speed"), "rate of 'cart.speed'"),
