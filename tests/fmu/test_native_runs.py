@@ -372,7 +372,7 @@ def test_an_early_return_is_for_the_limit_alone(fmi3: Library) -> None:
 
 
 def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, Library]) -> None:
-    """Loose steps come upon the limit in every way: by an accepted step, by one whose end is beyond, by shrinking steps."""
+    """Loose steps come upon the limit by an accepted step or by shrinking steps, and never pass to where no links are joined."""
     words = set()
     for name in FILES[1::2]:
         force, modes = TOO_MUCH[model(libraries[name])]
@@ -400,8 +400,7 @@ def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, 
         assert c.step(0.0, 1e8) == DISCARD
         assert c.status() == 3
         words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
-    joined = {"the links cannot be", "the rod does not"}
-    assert words - {""} == {"limit of assembly at", "limit of assembly near", *joined}
+    assert words - {""} == {"limit of assembly at", "limit of assembly near"}
 
 
 def test_a_mechanism_at_rest_takes_any_step(five_bar: Library) -> None:
