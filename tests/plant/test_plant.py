@@ -330,9 +330,7 @@ def test_end_of_a_step_that_cannot_be_assembled_is_refused_without_the_equations
     # they are not asked at the end of a step, and know no limit here: the slider goes on
     equations = plant.mechanism.equations._replace(derivative=lambda x, i, p: (0.0, 10.0, 0.0, 0.0, 0.0, 0.0))
     monkeypatch.setattr(plant, "mechanism", replace(plant.mechanism, equations=equations))
-    with pytest.raises(
-        AssemblyError, match=r"in the step from t = 0 s: the links cannot be joined at .* position 0.2"
-    ):
+    with pytest.raises(AssemblyError, match=r"in the step from t = 0 s: the links cannot be joined at .* position 0.2"):
         plant.step(0.0, 0.1)
     assert plant.state == before
 
