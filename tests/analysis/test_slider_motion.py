@@ -151,6 +151,26 @@ def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
     assert found.best.error <= moved(2).best.error * (1.0 + 1e-9)
 
 
+def test_a_motion_is_not_worse_than_the_slider_at_rest() -> None:
+    """The linkage is on both bounds of its transmission angle, which every motion of the slider leaves at first."""
+    phi = syn.turn(24)
+    points = 1e-3 * np.column_stack([20.0 + 30.0 * np.cos(phi) + 8.0 * np.cos(2.0 * phi), 15.0 + 20.0 * np.sin(phi)])
+    linkage = syn.Linkage(
+        pivot_x=0.024575, pivot_y=-0.084377, ground_length=0.15, crank_length=0.018736, coupler_length=0.149601,
+        rocker_length=0.021692, point_distance=0.099907, ground_angle=-1.485239, crank_phase=1.47603, point_angle=-3.069225,
+        branch=-1,
+    )  # fmt: skip
+    fixed = syn.Solution.from_linkage(syn.TimedPath(points=points), linkage)
+    found = slider_motion(
+        fixed.task,
+        linkage,
+        syn.SliderUnknown(harmonics=0, stroke=0.02),
+        constraints=[syn.LeastTransmission(angle=radians(29.99))],
+        search=syn.Search(starts=3),
+    )
+    assert found.best.error <= fixed.error * (1.0 + 1e-9)
+
+
 # Derivatives
 
 

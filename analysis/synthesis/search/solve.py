@@ -50,6 +50,7 @@ from .polish import (
     QUICK_SEARCH,
     USUAL_SEARCH,
     Polished,
+    Polisher,
     Search,
     distinct_answers,
     feasible_answers,
@@ -406,6 +407,10 @@ def improve(
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
     done = polish(normal, limits, begin, pivot=pivot, search=search)
+    as_given = Polisher(normal, limits, pivot).judge_start(base)
+    if as_given.feasible and all(answer.start.quality > as_given.start.quality for answer in done.kept):
+        # the pivot at rest does better than all motions found from other starts
+        done = done.merge(polish(normal, limits, [base], pivot=pivot, search=search))
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
     same: dict[str, Any] = {name: getattr(given, name) for name in kept}
 
