@@ -23,12 +23,13 @@ VERY_CLOSE_DEG, ABNORMAL = 1.0, 10.0
 
 #: The rule as the pages print it.
 RULE = (
-    "**Words of degree.** Both pages convert these words to numbers by one rule. *About*, *approximately*, *nearly*, *almost*, "
-    f"*near*, *around*, *in the region of*, *similar*: within {100 * ABOUT:g} % of the number; for an angle within "
-    f"{ABOUT_DEG:g} deg; for a number of whole cycles within half a cycle. *Slightly*, *a little*: a change by at most "
-    f"{100 * SLIGHTLY:g} % and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what it is "
-    f"compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, a "
-    f"difference that cannot be seen on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, "
-    f"or {READ_DEG:g} deg. *Very close*: within {VERY_CLOSE_DEG:g} deg. *Abnormally*: at least {ABNORMAL:g} times as much. A "
+    "**Words of degree.** Both pages convert these words to numbers by one rule; a row that departs from it gives the reason. "
+    "*About*, *approximately*, *nearly*, *almost*, *near*, *around*, *in the region of*, *similar*: within "
+    f"{100 * ABOUT:g} % of the number; for an angle within {ABOUT_DEG:g} deg; for a number of whole cycles within half a "
+    f"cycle. *Slightly*, *a little*: a change by at most {100 * SLIGHTLY:g} % and by more than {100 * ALIKE:g} %. *Small*, "
+    f"*negligible*: at most {100 * SMALL:g} % of what it is compared with. *The same*, *constant*, *linear*, *straight*, "
+    f"*steady*: within {100 * ALIKE:g} % of the scale, a difference that cannot be seen on a graph. A number that was "
+    f"read from a graph: within {100 * READ:g} % of its scale, or {READ_DEG:g} deg. *Very close*: within "
+    f"{VERY_CLOSE_DEG:g} deg. *Abnormally*: at least {ABNORMAL:g} times as much. A "
     "printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: only the sign decides."
 )

@@ -383,7 +383,8 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
             "in an optimum manner, to the changes. Thus for automation purposes a heavy swing in favour of the direct search "
             "method is justified.",
             text("7.3.1, L5873-5881"),
-            why="there is no measure of *merely* and *heavy swing*; a search on the machine is judged at L5853",
+            why="there is no measure of *merely*, *in an optimum manner* and *heavy swing*; a search on the machine, which "
+            "does not depend on what changed before it, is judged at L5853",
         ),
     )
 
