@@ -365,7 +365,7 @@ def hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions:
     switched = bool(switch) and bool(np.any(getattr(constants, switch)))
     ours = (machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES}))
     compiled_code = (fingerprint(f) if f else "" for f in (*kernels, *functions))
-    return " ".join([*ours, Path(__file__).read_text(encoding="utf-8"), *compiled_code])
+    return " ".join([*ours, str(mechanism.reach), Path(__file__).read_text(encoding="utf-8"), *compiled_code])
 
 
 def _is_switched_on(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:

@@ -372,7 +372,7 @@ def test_an_early_return_is_for_the_limit_alone(fmi3: Library) -> None:
 
 
 def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, Library]) -> None:
-    """Loose steps come upon the limit by an accepted step or by shrinking steps, and never pass to where no links are joined."""
+    """Loose steps come upon the limit by an accepted step or by shrinking steps; none passes to where no links are joined."""
     words = set()
     for name in FILES[1::2]:
         force, modes = TOO_MUCH[model(libraries[name])]
