@@ -147,6 +147,7 @@ def choose_first_size(motion):
 def next_size(carry, size):
     """Return the size of the next step, which is at most ``size``, and whether it is the last of its interval."""
     remaining = (carry.stop - carry.begin) - carry.elapsed
+    carry.step = size  # the step after a shortened one grows from it
     last = size >= remaining * (1.0 - 1e-10)
     return remaining if last else min(size, 0.5 * remaining), last
 

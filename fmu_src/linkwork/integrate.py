@@ -167,6 +167,7 @@ def integrate(
         size = bounded_step(proposal, k1, reach, scale)
         if clearance is not None:
             size = _step_short_of_limit(size, x, k1, clearance)
+        proposal = size  # the step after a shortened one grows from it
         last = size >= remaining * (1.0 - 1e-10)
         h = remaining if last else min(size, 0.5 * remaining)
         steps += 1

@@ -428,9 +428,10 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
     if (!all_finite(k, STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k, *duration);
     for (int steps = 1;; steps++) {
-        double remaining = *duration - done, size = bounded_step(a, proposal, x, k);
-        bool last = size >= remaining * (1.0 - 1e-10);
-        double h = last ? remaining : fmin(size, 0.5 * remaining);
+        double remaining = *duration - done;
+        proposal = bounded_step(a, proposal, x, k); /* the step after a shortened one grows from it */
+        bool last = proposal >= remaining * (1.0 - 1e-10);
+        double h = last ? remaining : fmin(proposal, 0.5 * remaining);
         if (steps > MAX_STEPS) {
             snprintf(cause, SENTENCE, "%d steps did not suffice: stopped %s s into an interval of %s s", MAX_STEPS,
                      digits(first, done), digits(second, *duration));
