@@ -429,13 +429,13 @@ def _hamming_statements() -> list[Statement]:
             "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
             "methods are highly stable.",
             text("2.4, L1379-1387"),
-            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in steps of {1e3 * STEP:g} ms at 420 "
-            "rpm. For *truncation*: greatest estimate divided by the greatest error. For *roundoff*: change of the estimate "
-            f"when u is rounded to {CM_PER_METRE * UNIT:g} cm, divided by the rounding (rms values). *Inherent* is read as an "
-            f"error of the start: greatest change of the estimate when u is wrong by {CM_PER_METRE * START_ERROR:g} cm there, "
-            "divided by this error. For *convergent*: factor per step by which the spurious solution of Milne's corrector "
-            "grows, for y' = -y with the step 0.1 (our example). For *highly stable*: greatest stable step of Hamming's method "
-            "for y'' = -y (our example), divided by that of Runge-Kutta's",
+            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in single steps of {1e3 * STEP:g} "
+            "ms from the exact motion at 420 rpm. For *truncation*: greatest estimate divided by the greatest error. For "
+            f"*roundoff*: change of the estimate when u is rounded to {CM_PER_METRE * UNIT:g} cm, divided by the rounding "
+            "(rms values). *Inherent* is read as an error of the start: greatest change of the estimate when u is wrong by "
+            f"{CM_PER_METRE * START_ERROR:g} cm there, divided by this error. For *convergent*: factor per step by which the "
+            "spurious solution of Milne's corrector grows, for y' = -y with the step 0.1 (our example). For *highly stable*: "
+            "greatest stable step of Hamming's method for y'' = -y (our example), divided by that of Runge-Kutta's",
             "0.5 to 2, our choice, since an estimate within a factor of 2 is useful; at most 1, as *convergent* says: one "
             "counterexample refutes *in all cases*; at least 1, since *highly* is read as no less than Runge-Kutta's method, "
             "which L1338 calls *highly susceptible* to instabilities",

@@ -179,9 +179,9 @@ def drift_result() -> StudyResult:
             Statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
-                "greatest change of the motion from one cycle to the next, relative to its range, after the line from end "
-                f"to end of each cycle is subtracted. Cycles 3 to {DRAWN_TURNS} (our choice), or until the links are "
-                "collinear as in the row before",
+                "range of the difference between the motions of one cycle and the next, relative to the range of the next, "
+                "after the line from end to end of each cycle is subtracted: the greatest. Cycles 3 to "
+                f"{DRAWN_TURNS} (our choice), or until the links are collinear as in the row before",
                 f"{ALIKE_WORDS}; {FEWEST_TURNS} cycles, two for the transient and two to compare",
                 (none, *shapes),
             ),

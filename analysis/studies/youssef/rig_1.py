@@ -81,8 +81,8 @@ def compute_rig_1() -> StudyResult:
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
                 "resonance curves could not be obtained using this apparatus.",
                 text("8.4.1.2, L6543"),
-                "amplitude at the natural frequency, 580 and 1160 rpm (L6553), relative to the greatest amplitude at the "
-                "speeds of the next sentence, which the guide did accommodate",
+                "amplitude at the natural frequency, 580 and 1160 rpm (L6553), relative to the greatest amplitude that the "
+                "guide did accommodate, at the lower speeds of the row at L6555",
                 "at least 1: we read *large* as more than the guide did accommodate, since its length is not printed",
                 tuple(at_least(f"spring {s}", 1.0, amplitude(turn(s, NATURAL[s])) / accommodated[s][1]) for s in "AB"),
             ),
