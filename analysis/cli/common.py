@@ -288,7 +288,7 @@ def case_options(published: Iterable[str]) -> Callable[..., Any]:
     return lambda command: case(option(setting(command)))
 
 
-def value_of(text: str) -> Any:
+def typed_value(text: str) -> Any:
     """Convert a text of the command line to a value: of TOML, as in a case file, or a number; any other text stays a text."""
     with suppress(ValueError, RecursionError):
         return tomllib.loads(f"value = {text}")["value"]
@@ -368,7 +368,7 @@ def quantity(text: str, unit: str, option: str) -> float:
     """Return the value of an option in SI, from a text such as "420 rpm" or a number without unit, which is in SI."""
     from .. import units
 
-    return units.quantity(value_of(text), unit, option)
+    return units.quantity(typed_value(text), unit, option)
 
 
 def changes(settings: Sequence[str], example: str) -> dict[str, Any]:
@@ -378,7 +378,7 @@ def changes(settings: Sequence[str], example: str) -> dict[str, Any]:
         name, equals, text = setting.partition("=")
         if not equals or not name.strip():
             raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as {example}")
-        values[name.strip()] = value_of(text.strip())
+        values[name.strip()] = typed_value(text.strip())
     return values
 
 

@@ -168,7 +168,7 @@ def natural_modes(
         guess = found[-1].coordinates if found else start
         found.append(find_equilibrium(parameters, still, held=held, guess=guess))
     for one, other in pairwise(found):
-        _check_between(mechanism, one, other)
+        _check_gap(mechanism, one, other)
     del found[samples:]
     states = np.array([one.state for one in found])
     modes, channels = sample_channels(mechanism, found[0].inputs, np.zeros(len(found)), states)
@@ -176,7 +176,7 @@ def natural_modes(
     return _decompose(tuple(found), matrices)
 
 
-def _check_between(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> None:
+def _check_gap(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> None:
     """Raise AssemblyError if the links come to the limit of assembly on the straight way between two equilibria."""
     from scipy.optimize import minimize_scalar
 

@@ -30,7 +30,7 @@ from ..common import (
     note,
     quantity,
     report_errors,
-    value_of,
+    typed_value,
 )
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def _choose(
     values = changes(settings, "rod.length='45 in'")
     for key, text in (("guide.offset", offset), ("guide.twist", twist)):
         if text is not None:
-            values[key] = value_of(text)
+            values[key] = typed_value(text)
     if shift is not None:
         if groove is not None:
             raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
