@@ -403,6 +403,14 @@ def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, 
     assert words - {""} == {"limit of assembly at", "limit of assembly near"}
 
 
+def test_a_step_that_begins_a_micrometre_before_the_limit_is_refused(five_bar: Library) -> None:
+    c = five_bar.instance().start(
+        drive__speed=0.0, initial__crank_speed=0.0, initial__slider_position=0.196499, initial__slider_velocity=1.0
+    )
+    assert c.step(0.0, 0.01) == DISCARD
+    assert (c.status(), *c.get("slider.position")) == (3, 0.196499)
+
+
 def test_a_mechanism_at_rest_takes_any_step(five_bar: Library) -> None:
     rest = {"drive__speed": 0.0, "initial__crank_speed": 0.0, "gravity": 0.0}
     c = five_bar.instance().start(**rest)
