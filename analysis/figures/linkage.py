@@ -159,8 +159,7 @@ class _Scene:
         foot = np.array([0.0, -2.0 * unit])
         links = [(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p)]
         lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
-        ends = ((-1.5, -1.0), (1.5, -1.0), (1.5, 1.0), (-1.5, 1.0))
-        block = Polygon([self.point(q.u + s * unit, n * unit) for s, n in ends])
+        block = Polygon(symbols.block_corners(self.point(q.u, 0.0), self.along, unit))
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
         for name, pin in pins.items():
             # of places with equal room one outside the loop is preferred

@@ -75,8 +75,8 @@ def name_in_words(name: str) -> str:
 
 def axis_label(name: str, unit: str) -> str:
     """Return the label of a low axis: the name in words over its unit, long names in two lines."""
-    words = wrap(name_in_words(name), 22)
-    return "\n".join(words) + f"{' ' if len(words) > 1 else chr(10)}[{unit}]"
+    lines = wrap(name_in_words(name), 22)
+    return "\n".join(lines) + (" " if len(lines) > 1 else "\n") + f"[{unit}]"
 
 
 def label_in_words(label: str) -> str:

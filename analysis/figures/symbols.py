@@ -81,10 +81,15 @@ def draw_pin(axis: Axes, place: Array, unit: float, colour: str = "white", *, zo
     axis.add_patch(Circle((x, y), radius, facecolor=colour, edgecolor="black", linewidth=edge, zorder=zorder))
 
 
+def block_corners(place: Array, along: Array, unit: float) -> list[Array]:
+    """Return the corners of a block that slides in the direction of the unit vector ``along``."""
+    across = np.array([-along[1], along[0]])
+    return [place + s * 1.5 * unit * along + n * unit * across for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+
+
 def draw_block(axis: Axes, place: Array, along: Array, unit: float) -> None:
     """Draw a block that slides in the direction of the unit vector ``along``."""
-    across = np.array([-along[1], along[0]])
-    corners = [place + s * 1.5 * unit * along + n * unit * across for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    corners = block_corners(place, along, unit)
     axis.add_patch(Polygon(corners, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from io import StringIO
-from math import atan2, cos, degrees, floor, hypot, isfinite, log10, radians, sin
+from math import atan2, ceil, cos, degrees, floor, hypot, isfinite, log10, radians, sin
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -243,7 +243,7 @@ def _label(dimension: Dimension, metre: float) -> str:
     It is rounded to 0.01 mm, or to four digits if it is shorter than 10 mm.
     """
     step = min(1e-5, 10.0 ** (floor(log10(dimension.length)) - 3))
-    return np.format_float_positional(round(dimension.length / metre, round(log10(metre / step) + 0.49)), trim="-")
+    return np.format_float_positional(round(dimension.length / metre, ceil(log10(metre / step) - 0.01)), trim="-")
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:

@@ -175,14 +175,14 @@ def fit_decay(
         )
 
     places, reach = range(len(turns)), half * _WINDOW
-    found = _fit(np.array([_turning_point(t, x, turn, reach) for turn in turns]), friction)
+    order = min(3, len(turns) // 3)  # the period of a nonlinear oscillation changes with its amplitude
+    found = _fit(np.array([_vertex(t, x, turn, reach) for turn in turns]), friction)
     for _ in range(_ROUNDS if friction else 1):
         # read at smoothed times: noise moves the vertex of a parabola outwards, which would lessen the decrement
-        order = min(3, len(turns) // 3)  # the period of a nonlinear oscillation changes with its amplitude
         smooth = np.polyval(np.polyfit(places, found.time, order, w=np.abs(found.fitted - found.offset)), places)
         jumps = np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0)
         tops = [
-            (_turning_point(t, x, turn, reach, jump)[0], _turning_point(t, x, turn, reach, jump, time)[1])
+            (_vertex(t, x, turn, reach, jump)[0], _height(t, x, time, reach, jump))
             for turn, jump, time in zip(turns, jumps, smooth)
         ]
         found = _fit(np.array(tops), friction)
@@ -224,33 +224,40 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
     return found
 
 
-def _turning_point(
-    t: NDArray[np.float64],
-    x: NDArray[np.float64],
-    turn: int,
-    reach: float,
-    jump: float = 0.0,
-    time: float | None = None,
+def _vertex(
+    t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float, jump: float = 0.0
 ) -> tuple[float, float]:
-    """Return time and position of the vertex of a parabola fitted to the samples within ``reach`` of a turning point.
-
-    The parabola is fitted to at least three samples. Its curvature is the mean curvature times (1 + ``jump``) before the
-    vertex, and times (1 - ``jump``) after it. If the ``time`` of the turning point is known, return the position at this time.
-    """
-    if time is not None:
-        turn = int(np.clip(np.abs(t - time).argmin(), 1, len(t) - 2))
-    middle, scale = t[turn] if time is None else time, t[turn + 1] - t[turn - 1]
-    first, last = np.searchsorted(t, (middle - reach, middle + reach))
-    near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
+    """Return the vertex (time, position) of the parabola that fits the samples near a turning point: see `_parabola`."""
+    middle, scale = t[turn], t[turn + 1] - t[turn - 1]
+    near = _samples_near(t, turn, middle, reach)
     width, place, height = reach / scale + 1.0, 0.0, 0.0
-    for _ in range(_ROUNDS if time is None else 1):
-        s = (t[near] - middle) / scale - place
-        columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
-        a, b, height = np.linalg.lstsq(columns, x[near], rcond=None)[0].tolist()
-        if time is None:
-            step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
-            place, height = place + step, height + (a * step + b) * step
+    for _ in range(_ROUNDS):
+        a, b, height = _parabola((t[near] - middle) / scale - place, x[near], jump)
+        step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
+        place, height = place + step, height + (a * step + b) * step
     return middle + scale * place, height
+
+
+def _height(t: NDArray[np.float64], x: NDArray[np.float64], time: float, reach: float, jump: float) -> float:
+    """Return the position at the known time of a turning point, by a parabola that fits the samples near it."""
+    turn = int(np.clip(np.abs(t - time).argmin(), 1, len(t) - 2))
+    near = _samples_near(t, turn, time, reach)
+    return _parabola((t[near] - time) / (t[turn + 1] - t[turn - 1]), x[near], jump)[2]
+
+
+def _samples_near(t: NDArray[np.float64], turn: int, middle: float, reach: float) -> slice:
+    """Return the samples within ``reach`` of the time ``middle``, at least the sample ``turn`` and its neighbours."""
+    first, last = np.searchsorted(t, (middle - reach, middle + reach))
+    return slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
+
+
+def _parabola(s: NDArray[np.float64], x: NDArray[np.float64], jump: float) -> list[float]:
+    """Fit a s^2 + b s + c to positions x; return a, b and c.
+
+    The curvature is the mean curvature times (1 + ``jump``) before s = 0, and times (1 - ``jump``) after it.
+    """
+    columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
+    return list(np.linalg.lstsq(columns, x, rcond=None)[0].tolist())
 
 
 def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import integrate
 from scipy.integrate import BDF, LSODA, OdeSolver, Radau, solve_ivp
 
+from linkwork.integrate import UNDEFINED
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
@@ -191,7 +192,7 @@ class March:
         """Return the derivative at a state, or None if the equations have no value there."""
         try:
             return np.array(self.equations.derivative(tuple(x), held, self.of.p))
-        except (ArithmeticError, ValueError):
+        except UNDEFINED:
             return None
 
     def _with_early_end(self, method: str | type[OdeSolver]) -> str | type[OdeSolver]:
@@ -226,7 +227,7 @@ class March:
         """Return how far a state is from the limit of assembly; it is negative beyond."""
         try:
             found = float(self.equations.clearance(tuple(x), self.held, self.of.p) - LIMIT_SINE)
-        except (ArithmeticError, ValueError):
+        except UNDEFINED:
             return -1.0
         return -1.0 if np.isnan(found) else found
 
@@ -234,7 +235,7 @@ class March:
         """Return the outputs at a state; all are NaN if the equations have no value there, for example a spring's law."""
         try:
             found: tuple[float, ...] = self.equations.outputs(tuple(x), held, self.energy, self.of.p)
-        except (ArithmeticError, ValueError):
+        except UNDEFINED:
             return (np.nan,) * len(self.of.mechanism.output_names)
         return found
 
