@@ -21,6 +21,7 @@ MODULES = (
     "analysis.run.compiled",
     "analysis.run.lanes",
     "analysis.run.sources",
+    "analysis.slider_crank.kernels",
     "analysis.synthesis.linkage.kernels",
 )
 

@@ -33,6 +33,7 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
 from ..display import format_range
+from ..numerics.tracing import ReboundFunctions
 from ..run import complete_speed, float_array, require_kind, takes_published
 from ..units import Amount, in_si
 from . import mobility
@@ -77,6 +78,7 @@ class Solution(NamedTuple):
 
 
 def solve(
+    f: ReboundFunctions,
     p: Constants,
     angle: Any,
     shift: ShiftMotion,
@@ -87,14 +89,13 @@ def solve(
     torque: bool,
     groove: bool,
 ) -> Solution:
-    """Solve one of the force problems at configurations that can be assembled, on arrays or dual numbers.
+    """Solve one of the force problems at configurations that can be assembled, on arrays, dual numbers or symbols.
 
-    The arguments are constants, theta1 (rad), the shift's motion, theta1' (rad/s) and theta1'' (rad/s2); ``given`` is the load
-    (N) or, with ``torque``, the torque (N.m): the load is then sought, which is not finite where the ratio is zero. ``groove``
-    says whether the parameters' groove makes the shift. The ratio is minus the derivative of the torque with respect to the
-    load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the shift.
+    ``f`` are the equations for these. The other arguments are constants, theta1 (rad), the shift's motion, theta1' (rad/s) and
+    theta1'' (rad/s2); ``given`` is the load (N) or, with ``torque``, the torque (N.m): the load is then sought, which is not
+    finite where the ratio is zero. ``groove`` says whether the parameters' groove makes the shift. The ratio is minus the
+    derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the shift.
     """
-    f = plant_functions()
     q = f.position(angle, shift.shift, p)
     k = f.coefficients(q, p)
     x = (angle, shift.shift, speed, shift.velocity, 0.0, 0.0)
@@ -423,7 +424,17 @@ def force_turn(
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=has_shaft_groove(shift))
+        found = solve(
+            plant_functions(),
+            p,
+            th,
+            moving,
+            w,
+            e,
+            given=given,
+            torque=torque is not None,
+            groove=has_shaft_groove(shift),
+        )
     n, m, r = th.size, found.motion, found.reactions
     never = np.zeros(n, dtype=bool)
     dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
-from math import degrees, inf
+from functools import lru_cache, partial
+from math import degrees
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -19,9 +19,14 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..display import format_range
 from ..files import Whole
+from ..numerics.codegen import MAKING, MachineCode
+from ..numerics.lanes import width
+from ..numerics.symbolic import library, symbolic_functions
 from ..numerics.workers import check_jobs, run_in_parallel, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
+from .kernels import collect_bins, count_in_bins, evaluate_samples
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, shown_units
+from .shifts import MODULES, has_shaft_groove
 from .tolerances import (
     ANGLE,
     FREE_OF_LOAD,
@@ -29,10 +34,13 @@ from .tolerances import (
     QUANTITIES,
     SHIFT,
     Estimate,
+    Instant,
     Tolerance,
+    add_errors,
     check_names,
     check_tolerances,
-    perturb,
+    instant,
+    nominal_values,
     require_turn,
     tolerance_effects,
 )
@@ -41,12 +49,10 @@ from .tolerances import (
 PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
 #: Error of the linear estimate, relative to the standard deviation, above which it is reported.
 OFF = 0.05
-#: Number of samples that are evaluated at once, small enough for the processor's cache.
-_CHUNK = 16384
-#: Number of parts of the turn for each worker process.
+#: Number of parts of the turn for each worker.
 _PARTS = 4
-#: Bins of the histograms.
-_BINS = 80
+#: Bins of the histograms, and bins by which the percentiles are found.
+_BINS, _FINE_BINS = 80, 8192
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -244,8 +250,8 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sample a mechanism with random errors of its dimensions, at every angle of a turn.
 
-    The same samples are used at all angles. With a million samples, each angle takes about 0.02 s for the slider's position,
-    and about half a second for all quantities.
+    The same samples are used at all angles. A million samples take some hundredths of a second per angle for the slider's
+    position, and seven times as long for all quantities.
 
     Parameters
     ----------
@@ -259,7 +265,7 @@ def monte_carlo(
     seed : int
         Seed of the random numbers: the same seed gives the same samples.
     n_jobs : int, optional
-        Number of processes, -1 for one per core; inside `joblib.parallel_config` all cores of the cluster are used.
+        Number of threads, -1 for one per core; inside `joblib.parallel_config` all cores of the cluster are used.
 
     Raises
     ------
@@ -283,12 +289,14 @@ def monte_carlo(
     check_names(quantities, QUANTITIES, "quantity")
     samples, seed = Whole(least=2)(samples, "samples"), Whole(least=0)(seed, "seed")
     check_jobs(n_jobs)
+    quantities = tuple(dict.fromkeys(quantities))
     linear = tolerance_effects(turn, tolerances, quantities)
+    _compile(turn, tuple(t.name for t in tolerances), quantities)  # once, before the workers need it
     cores = worker_count(n_jobs)
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]
-    work = partial(_sample_angles, turn, tuple(tolerances), tuple(quantities), samples, seed)
-    found = dict(run_in_parallel(work, parts, n_jobs=n_jobs))
+    work = partial(_sample_angles, turn, tuple(tolerances), quantities, samples, seed)
+    found = dict(run_in_parallel(work, parts, n_jobs=n_jobs, threads=True))
     drawn = [x for number in sorted(found) for x in found[number]]
     poles = {name: np.array([x.across and name not in FREE_OF_LOAD for x in drawn]) for name in quantities}
     return MonteCarlo(
@@ -325,69 +333,111 @@ class _Draws(NamedTuple):
 def _sample_angles(
     turn: ForceTurn,
     tolerances: Sequence[Tolerance],
-    quantities: Sequence[str],
+    quantities: tuple[str, ...],
     samples: int,
     seed: int,
     places: Sequence[int],
 ) -> list[_Draws]:
-    """Draw all samples, the same in each worker process, and evaluate them at the angles with the indices ``places``.
+    """Draw all samples, the same for each part of the turn, and evaluate them at the angles with the indices ``places``.
 
-    Drawing the samples in each process is faster than sending them.
+    Drawing the samples for each part is faster than sending them to other processes.
     """
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
-    return [_sample_angle(turn, i, errors, quantities) for i in places]
+    code, rows = _compile(turn, tuple(errors), quantities).addresses["sample"], np.array(list(errors.values()))
+    return [_sample_angle(turn, i, rows, quantities, code) for i in places]
 
 
-def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
-    """Evaluate the samples at angle i in chunks, and return their statistics."""
-    samples = len(next(iter(errors.values())))
-    found = {name: np.empty(samples) for name in quantities}
+def _sample_angle(turn: ForceTurn, i: int, errors: FloatArray, quantities: tuple[str, ...], code: int) -> _Draws:
+    """Evaluate the samples, the columns of ``errors``, at angle i with the compiled function; return their statistics."""
+    found = np.empty((len(quantities) + 2, errors.shape[1]))
     with_pole = turn.sought == SLIDER_FORCE and not set(quantities) <= set(KINEMATIC)
-    count = missed = dead = 0
-    least, greatest = inf, -inf  # lever
-    for start in range(0, samples, _CHUNK):
-        part = {name: x[start : start + _CHUNK] for name, x in errors.items()}
-        size = min(_CHUNK, samples - start)
-        varied = perturb(turn, i, part)
-        reached = np.broadcast_to(varied.assembly_square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
-        values, lever = varied.evaluate(quantities)
-        determined = np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length if with_pole else True
-        good = reached & determined
-        assembled, kept = int(np.count_nonzero(reached)), int(np.count_nonzero(good))
-        chosen = slice(None) if kept == size else good
-        for name in quantities:
-            found[name][count : count + kept] = np.broadcast_to(values[name], (size,))[chosen]
-        if with_pole and kept:
-            own = np.broadcast_to(lever, (size,))[chosen]
-            least, greatest = min(least, own.min()), max(greatest, own.max())
-        count += kept
-        missed += size - assembled
-        dead += assembled - kept
-    across = bool(least < 0.0 < greatest)
-    return _Draws({name: _statistics(found[name][:count]) for name in quantities}, across, missed, dead)
+    least_lever = DEAD_CENTRE * turn.parameters.crank_length if with_pole else -1.0
+    values = np.array(list(nominal_values(turn).values()), dtype=float)
+    missed, dead = evaluate_samples(code, width(), np.array(instant(turn, i)), values, errors, least_lever, found)
+    found = found[:, : found.shape[1] - missed - dead]
+    across = with_pole and found.size > 0 and bool(found[-2].min() < 0.0 < found[-2].max())
+    return _Draws({name: _statistics(x) for name, x in zip(quantities, found)}, across, missed, dead)
+
+
+def _compile(turn: ForceTurn, names: tuple[str, ...], quantities: tuple[str, ...]) -> MachineCode:
+    """Compile the function of `evaluate_samples` for the force problem of a turn, and errors and quantities of these names."""
+    return _compile_problem(turn.sought == SLIDER_FORCE, has_shaft_groove(turn.law), names, quantities)
+
+
+@lru_cache(maxsize=32)
+def _compile_problem(
+    load_sought: bool, grooved: bool, names: tuple[str, ...], quantities: tuple[str, ...]
+) -> MachineCode:
+    casadi, own = library(), fields(SliderCrankParameters)
+    nominal, values, errors = (
+        casadi.SX.sym(name, size)
+        for name, size in (("nominal", len(Instant._fields)), ("values", len(own)), ("errors", len(names)))
+    )
+    varied = add_errors(
+        symbolic_functions(MODULES, float=lambda x: x),
+        load_sought,
+        grooved,
+        {field.name: x for field, x in zip(own, casadi.vertsplit(values))},
+        Instant(*casadi.vertsplit(nominal)),
+        dict(zip(names, casadi.vertsplit(errors))),
+    )
+    found, lever = varied.evaluate(quantities)
+    out = casadi.vertcat(*found.values(), lever, varied.assembly_square - (LIMIT_SINE * varied.p.a2) ** 2)
+    arguments = [casadi.SX.sym("t"), nominal, errors, values, casadi.SX.sym("unused")]
+    with MAKING:
+        return MachineCode([casadi.Function("sample", arguments, [casadi.densify(out)], {"cse": True})], width())
 
 
 def _statistics(values: FloatArray) -> tuple[Any, ...]:
-    """Return the fields of `Spread` for the samples at one angle, NaN without samples; reorder ``values``."""
+    """Return the fields of `Spread` for the samples at one angle, NaN without samples."""
     if values.size < 2:
         none = np.nan
         return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
-    # before the values are in an order that depends on the processor
-    mean, deviation = float(values.mean()), float(values.std(ddof=1))
     places = np.array(PERCENTILES) / 100.0 * (values.size - 1)
     below = np.minimum(places.astype(int), values.size - 2)
-    ends = int(0.0005 * values.size), int(0.9995 * (values.size - 1))
-    # a sort would take three times as long
-    values.partition([0, *ends, *below, *below + 1, values.size - 1])
-    percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
-    low, high = values[0], values[-1]
-    first, last = values[list(ends)]
-    # if all samples are equal, the bins would have no width: they are given one that floats can represent
-    width = max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300)
-    counts, edges = np.histogram(values, _BINS, (first, first + width))
-    return mean, deviation, percentiles, low, high, edges, counts
+    low, first, last, high, *around = order_statistics(
+        values,
+        np.array([0, int(0.0005 * values.size), int(0.9995 * (values.size - 1)), values.size - 1, *below, *below + 1]),
+    )
+    lower, upper = np.split(np.array(around), 2)
+    end = _upper_end(first, last)
+    counts = np.zeros(_BINS, dtype=np.int64)
+    count_in_bins(values, first, end, counts)
+    percentiles = lower + (places - below) * (upper - lower)
+    return (
+        float(values.mean()),
+        float(values.std(ddof=1)),
+        percentiles,
+        low,
+        high,
+        np.linspace(first, end, _BINS + 1),
+        counts,
+    )
+
+
+def order_statistics(values: FloatArray, places: NDArray[np.int64]) -> FloatArray:
+    """Return the values that would be at ``places`` if all values were sorted; a partition would take four times as long.
+
+    The values are counted in equal bins. Only those in the bins of the places are sorted.
+    """
+    low = float(values.min())
+    high = _upper_end(low, float(values.max()))
+    counts = np.zeros(_FINE_BINS, dtype=np.int64)
+    count_in_bins(values, low, high, counts)
+    wanted = np.zeros(_FINE_BINS, dtype=bool)
+    bins = np.searchsorted(np.cumsum(counts), places, side="right")
+    wanted[bins] = True
+    few = np.empty(counts[wanted].sum())
+    collect_bins(values, low, high, wanted, few)
+    few.sort()
+    return np.asarray(few[places - np.cumsum(np.where(wanted, 0, counts))[bins]])
+
+
+def _upper_end(low: float, high: float) -> float:
+    """Return the end of the last bin from ``low`` to ``high``: further up if floats could not tell the bins apart."""
+    return max(high, low + max(1e-12 * max(abs(low), abs(high)), 1e-300))
 
 
 def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread:

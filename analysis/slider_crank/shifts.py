@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from linkwork import friction
 from linkwork.errors import InputError, ParameterError
 from linkwork.limits import LIMIT_SINE
-from linkwork.slider_crank import dynamics, kinematics, vectors
+from linkwork.slider_crank import dynamics, kinematics, parameters, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..numerics.tracing import ReboundFunctions, rebind_functions
@@ -27,12 +27,15 @@ from . import mobility
 from .mobility import DeadCentre
 from .quantities import FloatArray
 
+#: Modules of the slider-crank's equations and of their constants.
+MODULES = parameters, friction, vectors, kinematics, dynamics
+
 
 @cache
 def plant_functions() -> ReboundFunctions:
     """Return the slider-crank's equations of `linkwork`, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
-    return rebind_functions((friction, vectors, kinematics, dynamics), elementary)
+    return rebind_functions(MODULES, elementary)
 
 
 class ShiftMotion(NamedTuple):
@@ -114,8 +117,7 @@ class GrooveShift:
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """Return shift and rates; see `ShiftLaw.at`."""
         # the plant's function uses only amplitude and ratio of the constants
-        shift, pitch, bend = plant_functions().groove(angle, self)
-        return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
+        return groove_motion(plant_functions(), self, angle, speed, acceleration)
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """Return the law as `mobility.PeriodicShift`; None if alpha is not a ratio of small whole numbers."""
@@ -187,6 +189,12 @@ class TimeShift:
     def periodic_shift(self, parameters: SliderCrankParameters) -> None:
         """Return None: the law need not repeat after whole turns."""
         return None
+
+
+def groove_motion(f: ReboundFunctions, p: Any, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+    """Return the shift by the groove with ``amplitude`` and ``ratio`` of ``p``, and its rates; ``f`` are the equations."""
+    shift, pitch, bend = f.groove(angle, p)
+    return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
 
 def has_shaft_groove(law: ShiftLaw) -> bool:

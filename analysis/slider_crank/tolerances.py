@@ -12,30 +12,30 @@ analysis (`sampling`) evaluates the same equations on random samples and shows w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import isfinite, sqrt
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 from linkwork.parameters import field_name
-from linkwork.slider_crank import parameters, variables
+from linkwork.slider_crank import variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..display import format_range
 from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
-from ..numerics.tracing import rebind_functions
+from ..numerics.tracing import ReboundFunctions
 from ..run import require_kind
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
-from .shifts import ShiftMotion, has_shaft_groove, plant_functions, with_groove
+from .shifts import GrooveShift, ShiftMotion, groove_motion, has_shaft_groove, plant_functions
 
 #: Settings that may be in error besides the mechanism's parameters: the crank angle and the axial shift, by output name.
 ANGLE, SHIFT = "crank.angle", "shift.position"
@@ -75,11 +75,6 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 )
 #: Quantities that do not depend on the load if it is sought, and are therefore determined at a dead centre, too.
 FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
-
-#: `SliderCrankParameters.constants` for parameters that are arrays or dual numbers.
-_CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos": np.cos, "sin": np.sin}).find(
-    SliderCrankParameters.constants
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,39 +158,55 @@ def sensitivities(
     )
 
 
+class Instant(NamedTuple):
+    """Nominal motion, and the given load or torque, at points of a turn: numbers, arrays or symbols."""
+
+    angle: Any
+    speed: Any
+    acceleration: Any
+    shift: Any
+    shift_velocity: Any
+    shift_acceleration: Any
+    given: Any
+
+
 @dataclass(frozen=True, slots=True)
 class PerturbedTurn:
-    """Mechanism and motion with errors, at the points ``at`` of a turn: constants, crank angle and shift."""
+    """Mechanism and motion with errors, at points of a turn: constants, crank angle and shift.
 
-    turn: ForceTurn
-    at: Any
+    ``load_sought`` and ``grooved`` say which force problem is solved, as ``torque`` and ``groove`` of `forces.solve`.
+    """
+
+    load_sought: bool
+    grooved: bool
+    nominal: Instant
     p: Constants
     angle: Any
     moving: ShiftMotion
+    functions: ReboundFunctions
 
     @property
     def assembly_square(self) -> Any:
         """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""
-        return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
+        return self.functions.assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
         """Return the values of quantities by name, and the lever arm of the slider's force about the crank axis (m).
 
         Forces are computed only if a quantity depends on them; otherwise the lever arm is 0.
         """
-        turn, p, moving = self.turn, self.p, self.moving
-        w, e = turn.speed[self.at], turn.acceleration[self.at]
+        p, moving = self.p, self.moving
+        w, e, given = self.nominal.speed, self.nominal.acceleration, self.nominal.given
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if set(quantities) <= set(KINEMATIC):
                 return self._motion(quantities, w, e), 0.0
-            sought = turn.sought == SLIDER_FORCE
-            given = (turn.torque if sought else turn.slider_force).data[self.at]
-            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=has_shaft_groove(turn.law))
+            f, torque, groove = self.functions, self.load_sought, self.grooved
+            s = solve(f, p, self.angle, moving, w, e, given=given, torque=torque, groove=groove)
         found = {
             "slider.position": s.position.s4,
             "slider.velocity": s.motion.slider_velocity,
             "slider.acceleration": s.motion.slider_acceleration,
-            "drive.applied_torque": given if sought else s.motion.torque,
+            "drive.applied_torque": given if self.load_sought else s.motion.torque,
             "slider.load": s.load,
         }
         found |= {name: getattr(getattr(s.reactions, vector), axis) for name, (vector, axis) in _COMPONENTS.items()}
@@ -203,7 +214,7 @@ class PerturbedTurn:
         return {name: found[name] for name in quantities}, s.ratio
 
     def _motion(self, quantities: Collection[str], w: Any, e: Any) -> dict[str, Any]:
-        f, p, moving = plant_functions(), self.p, self.moving
+        f, p, moving = self.functions, self.p, self.moving
         q = f.position(self.angle, moving.shift, p)
         found = {"slider.position": q.s4}
         if set(quantities) != {"slider.position"}:
@@ -214,19 +225,44 @@ class PerturbedTurn:
         return {name: found[name] for name in quantities}
 
 
+def instant(turn: ForceTurn, at: Any) -> Instant:
+    """Return the motion and the given load or torque at the points of a turn with the indices ``at``."""
+    given = (turn.torque if turn.sought == SLIDER_FORCE else turn.slider_force).data[at]
+    shift = turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at]
+    return Instant(turn.angle[at], turn.speed[at], turn.acceleration[at], *shift, given)
+
+
+def nominal_values(turn: ForceTurn) -> dict[str, float]:
+    """Return the parameters by field name, with amplitude and ratio of the groove that makes the shift."""
+    values = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
+    if isinstance(turn.law, GrooveShift):
+        values |= {"groove_amplitude": turn.law.amplitude, "groove_ratio": turn.law.ratio}
+    return values
+
+
 def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTurn:
     """Add ``errors``, arrays or dual numbers by name, to the mechanism at the points of the turn with the indices ``at``."""
-    nominal = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
-    changed = {
-        field_name(name): nominal[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)
-    }
-    p = with_groove(_CONSTANTS(SimpleNamespace(**nominal | changed)), turn.law)
-    angle = turn.angle[at] + errors.get(ANGLE, 0.0)
-    if has_shaft_groove(turn.law):
-        moving = turn.law.at(angle, turn.speed[at], turn.acceleration[at])
-    else:
-        moving = ShiftMotion(turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at])
-    return PerturbedTurn(turn, at, p, angle, moving._replace(shift=moving.shift + errors.get(SHIFT, 0.0)))
+    load_sought, grooved = turn.sought == SLIDER_FORCE, has_shaft_groove(turn.law)
+    return add_errors(plant_functions(), load_sought, grooved, nominal_values(turn), instant(turn, at), errors)
+
+
+def add_errors(
+    f: ReboundFunctions,
+    load_sought: bool,
+    grooved: bool,
+    values: Mapping[str, Any],
+    nominal: Instant,
+    errors: Mapping[str, Any],
+) -> PerturbedTurn:
+    """Add ``errors`` by name to the parameters ``values`` and to the motion; ``f`` are the equations for what these are."""
+    moved = {field_name(name): values[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)}
+    p = f.find(SliderCrankParameters.constants)(SimpleNamespace(**{**values, **moved}))
+    angle = nominal.angle + errors.get(ANGLE, 0.0)
+    moving = ShiftMotion(nominal.shift, nominal.shift_velocity, nominal.shift_acceleration)
+    if grooved:
+        moving = groove_motion(f, p, angle, nominal.speed, nominal.acceleration)
+    moving = moving._replace(shift=moving.shift + errors.get(SHIFT, 0.0))
+    return PerturbedTurn(load_sought, grooved, nominal, p, angle, moving, f)
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:

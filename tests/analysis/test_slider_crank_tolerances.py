@@ -30,6 +30,7 @@ from analysis.slider_crank import (
     sensitivities,
     tolerance_effects,
 )
+from analysis.slider_crank.sampling import order_statistics
 from linkwork.errors import InputError, ParameterError
 from linkwork.parameters import field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
@@ -236,7 +237,8 @@ def test_linear_estimate_is_the_sum_of_variances() -> None:
 def test_samples_are_those_of_the_closed_form() -> None:
     """Mean, deviation, percentiles and histogram against NumPy's of the closed form, with the same draws."""
     samples, angles = 40_000, np.array([0.2, 2.0, 5.0])
-    result = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=5)
+    twice = ("slider.position", "slider.position")
+    result = monte_carlo(offset_turn(angles), TOLERANCES, quantities=twice, samples=samples, seed=5)
     generator = np.random.default_rng(5)
     x = {t.name: t.draw(generator, samples) for t in TOLERANCES}
     spread = result.spreads["slider.position"]
@@ -264,6 +266,32 @@ def test_samples_are_those_of_the_closed_form() -> None:
     other = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=6)
     assert (same.spreads["slider.position"].mean == spread.mean).all()
     assert (other.spreads["slider.position"].mean != spread.mean).all()
+
+
+@given(st.lists(st.sampled_from([0.0, 1.0, -3.0, 1e-3, 1e12, 5e-324]) | st.floats(-1e3, 1e3), min_size=2, max_size=300))
+def test_order_statistics_are_those_of_the_sorted_values(values: list[float]) -> None:
+    found = order_statistics(np.array(values), np.arange(len(values))[::3])
+    assert found.tolist() == sorted(values)[::3]
+
+
+@pytest.mark.parametrize("problem", [{"load": 40.0}, {"torque": CRANK_TORQUE}], ids=["load given", "torque given"])
+def test_samples_with_a_groove_are_mechanisms_changed(problem: dict[str, Any]) -> None:
+    """The error of the crank's angle moves the shift, too, as the groove in the shaft makes it."""
+    given_law = {"crank_speed": CRANK_SPEED, "shift": GrooveShift(0.05, 2.0, in_shaft=True), **problem}
+    tolerances = Tolerance(ANGLE, 0.01), Tolerance("rod.length", 2e-3)
+    result = monte_carlo(
+        force_turn(OFFSET, angles=[0.7], **given_law), tolerances, quantities=tuple(QUANTITIES), samples=5
+    )
+    generator = np.random.default_rng(0)
+    angles, lengths = (t.draw(generator, 5) for t in tolerances)
+    turns = [
+        force_turn(changed(OFFSET, "rod.length", length), angles=[0.7 + angle], **given_law)
+        for angle, length in zip(angles, lengths)
+    ]
+    for name in QUANTITIES:
+        values = [float(quantities_of(turn)[name][0]) for turn in turns]
+        assert result.spreads[name].mean[0] == pytest.approx(np.mean(values), rel=1e-9, abs=1e-12)
+        assert result.spreads[name].greatest[0] == pytest.approx(max(values), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("problem", [{"load": 40.0}, {"torque": CRANK_TORQUE}], ids=["load given", "torque given"])
