@@ -172,6 +172,18 @@ class MonteCarlo:
         linear = self.estimates[quantity]
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
+    def standard_error(self, quantity: str) -> MaskedArray:
+        """Return the standard error of the mean of the samples, shape (n,), in the unit of the quantity.
+
+        Raises
+        ------
+        ParameterError
+            If the quantity was not sampled.
+        """
+        check_names((quantity,), self.spreads, "quantity")
+        used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
+        return cast(MaskedArray, self.spreads[quantity].deviation / np.sqrt(used))
+
     def linear_misses(self, quantity: str) -> NDArray[np.bool_]:
         """Return a mask (n,) of the angles at which the linear estimate fails.
 
@@ -180,10 +192,9 @@ class MonteCarlo:
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
-        used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
         sd = spread.deviation
-        # the standard error of the mean, and of a standard deviation up to a kurtosis of five, is this share of the latter
-        allowed = OFF * sd + 5.0 * sd / np.sqrt(used)
+        # up to a kurtosis of five, the standard error of a standard deviation is at most that of the mean
+        allowed = OFF * sd + 5.0 * self.standard_error(quantity)
         rounding = 1e-9 * np.ma.abs(linear.nominal)
         off = (np.ma.abs(spread.mean - linear.nominal) > allowed + rounding) | (
             np.ma.abs(sd - linear.deviation) > allowed + rounding

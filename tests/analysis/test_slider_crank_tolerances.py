@@ -254,6 +254,7 @@ def test_samples_are_those_of_the_closed_form() -> None:
         )
         assert spread.mean[i] == pytest.approx(values.mean(), abs=1e-13)
         assert spread.deviation[i] == pytest.approx(values.std(ddof=1), rel=1e-9)
+        assert result.standard_error("slider.position")[i] == pytest.approx(values.std() / samples**0.5, rel=1e-4)
         assert spread.percentiles[:, i].data == pytest.approx(np.percentile(values, PERCENTILES), abs=1e-13)
         assert (spread.least[i], spread.greatest[i]) == pytest.approx((values.min(), values.max()), abs=1e-13)
         # a value on an edge may fall to either side

@@ -206,7 +206,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
 
 
 def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
-    """Print the linear estimate and the statistics of the samples at one crank angle."""
+    """Print the linear estimate and the statistics of the samples at one crank angle; "±" is two standard errors."""
     rows = []
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
@@ -217,7 +217,9 @@ def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> Non
             (spread.deviation, 3),
             (linear.worst, 3),
             (spread.mean - linear.nominal, 2),
+            (2.0 * found.standard_error(name), 1),
         )
-        rows.append((name, units.name(si), *(_number(x[place] * units.factor(si), digits) for x, digits in values)))
+        *numbers, off, error = (_number(x[place] * units.factor(si), digits) for x, digits in values)
+        rows.append((name, units.name(si), *numbers, f"{off} ± {error}"))
     headings = "quantity", "unit", "nominal", "sd, linear", "sd, 2nd order", "sd, samples", "worst, linear", "mean off"
     show_table(title, headings, rows)
