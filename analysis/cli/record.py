@@ -90,7 +90,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     if not options["friction"]:
         with suppress(InputError):
             dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
-            # more than noise and the approximation of the motion by parabolas can cause
+            # more than noise and the approximation of the motion by waves can cause
             if dry.friction > 5.0 * dry.friction_error and dry.residual < 0.5 * decay.residual:
                 note(
                     "the decrement grows from cycle to cycle, as with dry friction: with --friction the damping ratio is "

@@ -13,7 +13,7 @@ spring, times 1 + r / x before the turning point, and times 1 - r / x after it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, pi, sqrt
+from math import atan, cos, exp, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,9 +23,9 @@ from linkwork.errors import InputError
 
 #: Default of the smallest swing, as a fraction of the record's range: smaller swings count as noise.
 LEAST_SWING = 0.1
-#: Half width of the parabola fitted at a turning point, as a fraction of half a period: a cosine is a parabola to 0.03 % there.
+#: Half width of the wave fitted at a turning point, as a fraction of half a period.
 _WINDOW = 1.0 / 6.0
-#: Rounds of the iteration between the friction and the parabolas, whose curvature jumps by an amount that depends on friction.
+#: Rounds of the iteration between the friction and the waves, whose curvature jumps by an amount that depends on friction.
 _ROUNDS = 4
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
@@ -121,7 +121,7 @@ def fit_decay(
     """Fit logarithmic decrement, damping ratio and natural frequency to a record of a free decay.
 
     The times of the turning points and the decay of their distances from a constant offset are fitted by least squares. Each
-    turning point is the vertex of a parabola fitted to the samples near it, which averages noise.
+    turning point is the vertex of a sine wave fitted to the samples near it, which averages noise.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def fit_decay(
     order = min(3, len(turns) // 3)  # the period of a nonlinear oscillation changes with its amplitude
     found = _fit(np.array([_vertex(t, x, turn, reach) for turn in turns]), friction)
     for _ in range(_ROUNDS if friction else 1):
-        # read at smoothed times: noise moves the vertex of a parabola outwards, which would lessen the decrement
+        # read at smoothed times: noise moves the vertex of a wave outwards, which would lessen the decrement
         smooth = np.polyval(np.polyfit(places, found.time, order, w=np.abs(found.fitted - found.offset)), places)
         jumps = np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0)
         tops = [
@@ -227,22 +227,21 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
 def _vertex(
     t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float, jump: float = 0.0
 ) -> tuple[float, float]:
-    """Return the vertex (time, position) of the parabola that fits the samples near a turning point: see `_parabola`."""
-    middle, scale = t[turn], t[turn + 1] - t[turn - 1]
-    near = _samples_near(t, turn, middle, reach)
-    width, place, height = reach / scale + 1.0, 0.0, 0.0
+    """Return the vertex (time, position) of the wave that fits the samples near a turning point: see `_wave`."""
+    time, near, rate = t[turn], _samples_near(t, turn, t[turn], reach), pi * _WINDOW / reach
+    height = 0.0
     for _ in range(_ROUNDS):
-        a, b, height = _parabola((t[near] - middle) / scale - place, x[near], jump)
-        step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
-        place, height = place + step, height + (a * step + b) * step
-    return middle + scale * place, height
+        a, b, height = _wave(rate * (t[near] - time), x[near], jump)
+        step = atan(-b / a) if a else 0.0
+        time, height = time + step / rate, height + a * (1.0 - cos(step)) + b * sin(step)
+    return time, height
 
 
 def _height(t: NDArray[np.float64], x: NDArray[np.float64], time: float, reach: float, jump: float) -> float:
-    """Return the position at the known time of a turning point, by a parabola that fits the samples near it."""
+    """Return the position at the known time of a turning point, by a wave that fits the samples near it."""
     turn = int(np.clip(np.abs(t - time).argmin(), 1, len(t) - 2))
     near = _samples_near(t, turn, time, reach)
-    return _parabola((t[near] - time) / (t[turn + 1] - t[turn - 1]), x[near], jump)[2]
+    return _wave(pi * _WINDOW / reach * (t[near] - time), x[near], jump)[2]
 
 
 def _samples_near(t: NDArray[np.float64], turn: int, middle: float, reach: float) -> slice:
@@ -251,12 +250,14 @@ def _samples_near(t: NDArray[np.float64], turn: int, middle: float, reach: float
     return slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
 
 
-def _parabola(s: NDArray[np.float64], x: NDArray[np.float64], jump: float) -> list[float]:
-    """Fit a s^2 + b s + c to positions x; return a, b and c.
+def _wave(phase: NDArray[np.float64], x: NDArray[np.float64], jump: float) -> list[float]:
+    """Fit a (1 - cos(phase)) + b sin(phase) + c to positions x; return a, b and c.
 
-    The curvature is the mean curvature times (1 + ``jump``) before s = 0, and times (1 - ``jump``) after it.
+    The curvature is the mean curvature times (1 + ``jump``) before phase 0, and times (1 - ``jump``) after it.
     """
-    columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
+    columns = np.column_stack(
+        [(1.0 - np.cos(phase)) * (1.0 - jump * np.sign(phase)), np.sin(phase), np.ones_like(phase)]
+    )
     return list(np.linalg.lstsq(columns, x, rcond=None)[0].tolist())
 
 

@@ -103,6 +103,15 @@ def test_dry_friction(friction: float, sign: float) -> None:
     assert (np.diff(alone.cycle_decrements) > 0.0).all()
 
 
+@pytest.mark.parametrize("start", [0.0, 0.002, 0.004, 0.006, 0.008])
+def test_eight_samples_per_cycle(start: float) -> None:
+    """The samples nearest to a turning point are up to 45 deg from it, where a parabola is no cosine."""
+    t = start + 0.011 * np.arange(70)
+    found = fit_decay(t, free(t, 4.0, 0.5), friction=True)
+    assert found.damping(MASS)[0] == pytest.approx(4.0, rel=0.01)
+    assert found.friction * STIFFNESS == pytest.approx(0.5, rel=0.015)
+
+
 @pytest.mark.parametrize(("friction", "dt"), [(0.5, 2e-4), (1.5, 2e-4), (1.5, 1e-3)])
 def test_dry_friction_does_not_move_the_frequency(friction: float, dt: float) -> None:
     """The acceleration jumps at each turning point, the more, the smaller the swing: the frequency does not follow that."""
