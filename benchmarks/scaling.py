@@ -86,24 +86,31 @@ def import_packages(_: int) -> None:
     import analysis.synthesis  # noqa: F401
 
 
+def measure(backends: tuple[str | None, ...], repeats: int) -> list[list[list[tuple[float, float, Any]]]]:
+    """Time each kind of work on each backend, the backends in turn; return what `time_work` does, by work and backend."""
+    for backend in filter(None, backends):
+        with joblib.parallel_config(backend, n_jobs=2):
+            list(run_in_parallel(import_packages, range(8)))
+    turns = {name: [[time_work(work, b) for b in backends] for _ in range(repeats + 1)] for name, work in WORK.items()}
+    return [[list(row) for row in zip(*turns[name])] for name in WORK]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=3, help="repetitions of each measurement (default: %(default)s)")
     repeats = parser.parse_args().repeats
-    backends = (None, "loky", "dask")
     places = ("one worker", "two processes", "two workers of Dask")
     headings = [f"{place}: {what}" for place in places for what in ("clock", "CPU")]
     table = Table("work", *headings, "bits", title=f"{joblib.cpu_count()} cores")
+    # Dask comes last: its cluster sets MALLOC_TRIM_THRESHOLD_, which slows down the processes that are started afterwards
+    found = measure((None, "loky"), repeats)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster):
-        for backend in backends[1:]:
-            with joblib.parallel_config(backend, n_jobs=2):
-                list(run_in_parallel(import_packages, range(8)))
-        for name, work in WORK.items():
-            found = [[time_work(work, backend) for backend in backends] for _ in range(repeats + 1)]
-            # the first repetition compiles
-            times = [min(row[n][what] for row in found[1:]) for n in range(len(backends)) for what in (0, 1)]
-            alike = all(np.array_equal(result, found[0][0][2], equal_nan=True) for row in found for *_, result in row)
-            table.add_row(name, *(f"{t:.2f} s" for t in times), "the same" if alike else "DIFFERENT")
+        found = [here + there for here, there in zip(found, measure(("dask",), repeats))]
+    for name, rows in zip(WORK, found):
+        # the first repetition compiles
+        times = [min(time[what] for time in row[1:]) for row in rows for what in (0, 1)]
+        alike = all(np.array_equal(time[2], rows[0][0][2], equal_nan=True) for row in rows for time in row)
+        table.add_row(name, *(f"{t:.2f} s" for t in times), "the same" if alike else "DIFFERENT")
     Console(width=120).print(table)
 
 
