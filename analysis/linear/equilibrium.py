@@ -24,7 +24,16 @@ from ..mechanisms import InitialState, Parameters, find_mechanism, variable_unit
 from ..numerics import symbolic
 from ..run import Inputs, check_run, expressions, float_array, takes_published
 from ..units import Amount, in_si
-from .model import FloatArray, Layout, Modes, layout, sample_channels
+from .model import (
+    FloatArray,
+    Layout,
+    Modes,
+    layout,
+    linearise,
+    sample_channels,
+    vibration_grows,
+    without_dry_friction,
+)
 
 #: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom. The reach
 #: of an angle that a spring winds up is a turn to either side. With four free coordinates the grid is coarser.
@@ -129,15 +138,25 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool:
-        """Whether the potential energy of springs, gravity and constant forces is at a minimum over the free coordinates."""
+        """Whether no small deviation of the free coordinates grows, dry friction left out; a neutral equilibrium is not stable.
+
+        The stiffness must be positive, as at a minimum of the potential energy. A load in the axes of a body or a force law
+        that drives may let a vibration grow nevertheless: no pole may have a positive real part.
+        """
         balance = _Balance.build(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
-        values = np.linalg.eigvalsh(free)
-        return bool(values[0] > 1e-9 * np.abs(values).max())
+        # loads in the axes of a body make the stiffness unsymmetric
+        values = np.linalg.eigvals(free)
+        if values.real.min() <= 1e-9 * np.abs(values).max():
+            return False
+        return not vibration_grows(linearise(without_dry_friction(self.parameters), self.state, self.inputs).poles)
 
     @property
     def potential(self) -> float:
-        """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at zero displacement."""
+        """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at zero displacement.
+
+        Force laws of springs, and loads in the axes of a body, are left out.
+        """
         mechanism = find_mechanism(self.parameters)
         work = 0.0
         for channel in mechanism.channels:
@@ -317,7 +336,7 @@ def _balance_with_held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find the equilibria of a mechanism, starting from a grid over all configurations; sort them by potential energy.
+    """Find the equilibria of a mechanism, starting from a grid over all configurations; sort them by `Equilibrium.potential`.
 
     Parameters
     ----------
@@ -377,7 +396,8 @@ def find_equilibrium(
         As for `find_equilibria`.
     guess : array_like, optional
         All coordinates (rad, m) to start from; the values for held degrees of freedom are ignored. Without a guess the stable
-        equilibrium of least potential energy is returned or, if none is stable, the equilibrium of least potential energy.
+        equilibrium of least `Equilibrium.potential` is returned or, if none is stable, the equilibrium of least potential. The
+        potential does not include force laws of springs: of several stable equilibria under such laws choose one by a guess.
 
     Raises
     ------

@@ -14,7 +14,7 @@ coordinate.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
 
 from ..files import unknown_name
 from ..libraries import lazy
@@ -41,6 +42,9 @@ Modes = tuple[int, ...]
 
 #: Largest difference between a commanded rate and the rate in the state, relative to the rate in the state or, if larger, to 1.
 SAME_RATE = 1e-6
+#: Real or imaginary part of a pole that counts as zero, relative to the largest pole: a neutral coordinate has a double pole at
+#: zero, which rounding splits.
+ROUNDING = 1e-7
 
 
 class LinearModelError(LinkworkError):
@@ -354,6 +358,17 @@ def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
 
+def vibration_grows(poles: NDArray[np.complex128]) -> Any:
+    """Return whether the real part of a pole, along the last axis, is positive, apart from rounding."""
+    return poles.real.max(axis=-1) > ROUNDING * np.abs(poles).max(axis=-1)
+
+
+def without_dry_friction(parameters: Parameters) -> Parameters:
+    """Return the parameters of a mechanism with all its dry friction set to zero: at rest it would hold everything."""
+    names = find_mechanism(parameters).names("friction")
+    return replace(parameters, **{field_name(name): 0.0 for name in names})
+
+
 def _index(name: str, names: tuple[str, ...]) -> int:
     if name not in names:
         raise unknown_name(name, names)
@@ -449,6 +464,9 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
         instant.
     inputs : Inputs, optional
         Inputs at time 0, such as `Equilibrium.inputs`; they decide which degrees of freedom are free. By default no input acts.
+        If a torque or force is a law of the state, such as a motor's or a torsion bar's, only its value is used: the poles are
+        those under a constant torque. With the law's derivative s with respect to a state, B s is added to this state's column
+        of A.
 
     Raises
     ------

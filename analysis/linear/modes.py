@@ -7,7 +7,7 @@ evenly spaced positions of a turn, finds the equilibrium of all free coordinates
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.integrate import UNDEFINED
 from linkwork.mechanism import Mechanism
-from linkwork.parameters import field_name
 
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..run import (
@@ -31,12 +30,18 @@ from ..run import (
 )
 from ..units import RAD_S_PER_RPM
 from .equilibrium import Equilibrium, find_equilibrium
-from .model import FloatArray, Matrices, evaluate, layout, sample_channels
+from .model import (
+    ROUNDING,
+    FloatArray,
+    Matrices,
+    evaluate,
+    layout,
+    sample_channels,
+    vibration_grows,
+    without_dry_friction,
+)
 from .periodic import common_period
 
-#: Least imaginary part of a pole that oscillates, relative to the largest pole: a neutral coordinate has a double pole at zero,
-#: which rounding splits.
-OSCILLATES = 1e-7
 #: Likeness (from 0 to 1) below which a shape is that of a new mode, because it is not like any known mode.
 _NEW = 0.5
 
@@ -99,7 +104,7 @@ class NaturalModes:
     @property
     def unstable(self) -> int:
         """Number of positions of the cranks at which the equilibrium is unstable: a pole has a positive real part."""
-        return int(np.sum(self.poles.real.max(axis=1) > OSCILLATES * np.abs(self.poles).max(axis=1)))
+        return int(np.sum(vibration_grows(self.poles)))
 
     @staticmethod
     def _per_mode(values: FloatArray) -> list[FloatArray]:
@@ -147,7 +152,7 @@ def natural_modes(
     inputs, initial = check_run(mechanism, inputs, initial)
     if samples < 1:
         raise InputError(f"samples is {samples}: it must be at least 1")
-    parameters = replace(parameters, **{field_name(name): 0.0 for name in mechanism.names("friction")})
+    parameters = without_dry_friction(parameters)
     speeds = _held_speeds(mechanism, inputs, initial)
     if set(layout(mechanism, tuple(inputs.modes(mechanism).values())).free) <= speeds.keys():
         forces = [c.argument for c in mechanism.channels if c.kind == "force" and speeds.get(c.freedom) == 0.0]
@@ -226,7 +231,7 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
     frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
     known = np.zeros((size, size), dtype=complex)  # column k: the shape in which mode k oscillated last, or zeros
     for j, (poles, mass) in enumerate(zip(values, matrices.M)):
-        oscillating = np.flatnonzero(poles.imag > OSCILLATES * np.abs(poles).max())
+        oscillating = np.flatnonzero(poles.imag > ROUNDING * np.abs(poles).max())
         oscillating = oscillating[np.argsort(np.abs(poles[oscillating]))]
         shapes = vectors[j, :size, oscillating].T
         energies = (shapes.conj() * (mass @ shapes)).real

@@ -194,7 +194,8 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one multiplier is 1 along a motion of the free plant.
+        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion: the model has no
+        derivative of its torque, `PeriodicOrbit.multipliers` do.
 
         Raises
         ------
@@ -240,7 +241,7 @@ def linearise_orbit(
     inputs : Inputs, optional
         Inputs along a motion given as an array, whose first state is at time 0; none by default. If a torque or force is a law
         of the state, such as a motor's or a controller's, only its value is used: the model does not include the law's
-        derivative.
+        derivative, also along an orbit under a motor.
     period : float, optional
         Period (s); by default the period of the orbit, or, for an array at a constant prescribed speed, the time of one turn.
     samples : int

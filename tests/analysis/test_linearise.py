@@ -265,6 +265,27 @@ def test_a_stiff_spring_hides_no_equilibrium_of_a_crank() -> None:
     assert [one.stable for one in find_equilibria("stiff-bearing")] == [True, False]
 
 
+@pytest.mark.parametrize("order", [("lower", "upper"), ("upper", "lower")])
+@pytest.mark.parametrize(("thrust", "stable"), [(1.5, True), (2.08, True), (2.09, False)])
+def test_zieglers_column_flutters_under_a_thrust_along_its_upper_bar(order: Any, thrust: float, stable: bool) -> None:
+    """The critical thrust of masses 2 m and m on bars of length l with springs k is (7/2 - sqrt 2) k/l (Ziegler 1952)."""
+    column = linkage("follower", ground={"A": (0, 0)}, loads=[{"point": "C", "frame": "body"}])
+    for name, bar, mass in (("lower", ("A", "B"), 2.0), ("upper", ("B", "C"), 1.0)):
+        column.body(name, bar=bar, length=1.0, mass=mass, cog=(1.0, 0), inertia=0.0)
+        column.spring(f"{name}Spring", at=bar[0], stiffness=1.0)
+    for name in order:
+        column.freedom(name, {"lower": "A", "upper": "B"}[name], driven=False)
+    column.mechanism()
+    assert find_equilibrium("follower", Inputs(C_load_x=-thrust), guess=(0.0, 0.0)).stable is stable
+
+
+def test_an_equilibrium_from_which_a_force_law_drives_vibrations_is_not_stable() -> None:
+    block = linkage("driven-block", ground={"O": (0, 0)})
+    block.body("block", points={"P": (0, 0)}, mass=1.0).slide("X", body="block", through="O")
+    block.spring("belt", at="X", stiffness=100.0, law="-0.5*v").freedom("block", "X", driven=False).mechanism()
+    assert not find_equilibrium("driven-block").stable
+
+
 def test_equilibrium_with_the_crank_held() -> None:
     held = find_equilibrium(TABLE_3_1, Inputs(force=2.0), held={"crank.angle": 0.3})
     outputs = dynamics.outputs(held.state, dynamics.Inputs(1.0, 0.0, 0.0, 2.0, 0.0, 0.0), 0.0, TABLE_3_1.constants())
