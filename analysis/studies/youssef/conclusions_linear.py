@@ -219,8 +219,8 @@ def _on_resonance() -> tuple[Statement, ...]:
             "amplitude of vibrations and widened the region of resonance.",
             text("9.1, L7110"),
             f"resonant speeds without a damper, I4 = {_listed(RATIOS)}: distance from a line, relative to their range, and "
-            "greatest growth with I4. Then the least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of "
-            f"the range of speeds with u/l4 above {LARGE:g} (our choice), {DAMPERS_WORDS}; {RIGHT}",
+            "greatest growth with I4. Then the least growth, from I4 = 0.5 to 1 and 1.5, of the greatest first harmonic "
+            f"of u/l4 and of the range of speeds at which it is above {LARGE:g} (our choice), {DAMPERS_WORDS}; {RIGHT}",
             f"{ALIKE:g}, the rule for *linear*; {SIGN}",
             (
                 at_most("distance from a line", ALIKE, bend),

@@ -422,7 +422,7 @@ def judge_strategy() -> tuple[Statement, ...]:
             "*optimum* is read as the least error that we find. Error of the printed four-bars, mended, relative to it, as at "
             "L7026; error with the two printed series, as at L5935, relative to the least with as many harmonics and the same "
             "links. At Fig 7.11 the slider stays within l1 of the printed pivot; at Fig 7.12 its stroke is at most "
-            f"{CM_PER_METRE * PATH_SEARCHES[2][1]:g} cm, ten times the printed one (our limits)",
+            f"{CM_PER_METRE * PATH_SEARCHES[2][1]:g} cm, more than ten times the printed one (our limits)",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
             (
                 *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),

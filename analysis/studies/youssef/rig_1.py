@@ -257,6 +257,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
             "without it",
             f"{ABOUT_DEG:g} deg, the rule for *almost*",
             (at_most("shift", ABOUT_DEG, max(abs(lag("A", w, c)) for w, c in each), "deg"),),
+            "the amplitude varies slightly by our choice of the coefficients",
         ),
         Statement(
             "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
