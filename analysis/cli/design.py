@@ -219,6 +219,7 @@ def synthesize(
         alternatives,
         assess,
         crowded_plates,
+        format_sense,
         format_short,
         has_cognates,
         load_synthesis_case,
@@ -253,7 +254,7 @@ def synthesize(
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += common.save_plot(plot, result, folder / "alternatives.png", title=chosen.title)
     common.print_paths(written)
-    for note in filter(None, (best.poor, format_short(best.solution))):
+    for note in filter(None, (best.poor, format_short(best.solution), format_sense(chosen.task))):
         common.note(note)
     if crowded := crowded_plates(result.best, chosen.make.hole):
         common.note(
@@ -268,21 +269,23 @@ def synthesize(
     except TradeOffInterrupted as error:
         traded, stopped = error.trade_off, error
     if traded is not None:
-        common.print_paths(_trade_off(traded, chosen.title, folder, plot))
+        common.print_paths(_trade_off(traded, chosen.title, folder, plot, complete=stopped is None))
     leave_if_stopped(stopped, "what there is is kept")
 
 
-def _trade_off(traded: TradeOff, title: str, folder: Path, plot: bool) -> list[Path]:
+def _trade_off(traded: TradeOff, title: str, folder: Path, plot: bool, *, complete: bool) -> list[Path]:
     from ..synthesis import OVER, format_limit, quality_cells, quality_headings
 
     task = next((s.task for s in traded.solutions if s is not None), None)
     what = OVER[traded.over].name
     if task is None:
-        common.note(f"no linkage keeps any of the limits of the {what}")
+        if complete:
+            common.note(f"no linkage keeps any of the limits of the {what}")
         return []
     headings = ("limit", *quality_headings(task)[::2])
+    missing = "no linkage" if complete else "none found yet"
     rows = [
-        (format_limit(traded.over, float(limit)), *(("no linkage", "") if s is None else quality_cells(s)[::2]))
+        (format_limit(traded.over, float(limit)), *((missing, "") if s is None else quality_cells(s)[::2]))
         for limit, s in zip(traded.limit, traded.solutions)
     ]
     common.show_table(f"{title}: error against the {what}", headings, rows)

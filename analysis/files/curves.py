@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,15 @@ from ..units import INCH, LENGTHS, quantity
 from .outputs import note_assumed_units
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
-from .tables import NO_UNIT, SEPARATOR_LINE, heading_unit, units_below
+from .tables import BROKEN_NUMBER, NO_UNIT, SEPARATOR_LINE, heading_unit, units_below
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
-_CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
+_CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6, "q": 0.25e-3}
 #: Greatest deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
 _CHORD_ERROR = 1e-4
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+#: A cell in quotation marks that needs none.
+_QUOTED = re.compile(r'"([^",]*)"')
 #: Greatest extent of a curve of an SVG file (m); a larger extent is taken for a typing error.
 _WIDEST = 1e9
 #: Greatest depth of nested groups and ``<use>`` elements in an SVG file; greatest number of elements after each ``<use>`` is
@@ -34,6 +36,21 @@ _TRANSFORMS = {
     "matrix", "translate", "translateX", "translateY", "scale", "scaleX", "scaleY", "rotate", "skew", "skewX", "skewY",
     "px", "pt", "pc", "mm", "cm", "in", "deg", "rad", "grad", "turn", "e", "E",
 }  # fmt: skip
+#: Elements whose content is drawn by a reference only: svgelements draws it in place.
+_REFERENCED = ("symbol", "mask", "marker")
+#: A centre of a transform that is not the origin, in a style or an attribute.
+_CENTRE = re.compile(
+    r"transform-(?:box\s*:\s*(?!view-box)[^\s;}]+|origin\s*:[^;}]*(?:[1-9]|center|right|bottom)[^;}]*)", re.IGNORECASE
+)
+# Grammars of path data and of points: possessive, so that the match ends at the first mistake. A comma counts as a space.
+_NUMBER = r"(?>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)[\s,]*+"
+_COUNTS = {"Mm": 2, "Ll": 2, "Tt": 2, "Hh": 1, "Vv": 1, "Cc": 6, "Ss": 4, "Qq": 4}
+_COMMANDS = [rf"[{letters}]\s*+(?:(?:{_NUMBER}){{{count}}})++" for letters, count in _COUNTS.items()]
+_COMMANDS += [rf"[Aa]\s*+(?:(?:{_NUMBER}){{3}}(?:[01][\s,]*+){{2}}(?:{_NUMBER}){{2}})++", r"[Zz]\s*+"]
+_GRAMMARS = {
+    "d": re.compile(rf"\s*+(?=[Mm])(?:{'|'.join(_COMMANDS)})*+"),
+    "points": re.compile(rf"\s*+(?:(?:{_NUMBER}){{2}})*+"),
+}
 
 
 def read_points(
@@ -46,11 +63,11 @@ def read_points(
     comma. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is omitted and the
     curve is closed.
 
-    SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
-    selects an element by its ``id``; if the element is a group, the first path or shape in the group is read. Transforms are
-    applied. y points down in SVG, and is turned upwards: a point (x, y) in the user space of the drawing's ``viewBox`` becomes
-    (x, -y). Curves are replaced by chords, with a deviation below 1e-4 of the curve's extent. The curve is closed if the SVG
-    path is closed, or if the path ends at its first point.
+    SVG: the first path that is drawn is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or
+    line. ``name`` selects an element by its ``id``; if the element is a group, the first path or shape in the group is read.
+    Transforms are applied. y points down in SVG, and is turned upwards: a point (x, y) in the user space of the drawing's
+    ``viewBox`` becomes (x, -y). Curves are replaced by chords, with a deviation below 1e-4 of the curve's extent. The curve is
+    closed if the SVG path is closed, or if the path ends at its first point.
 
     Parameters
     ----------
@@ -118,6 +135,7 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
     for number, line in enumerate(text.splitlines(), start=1):
         if ";" in line or "\t" in line.strip():
             line = _DECIMAL_COMMA.sub(".", line)
+        line = _QUOTED.sub(r"\1", line)
         cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
         if number == 1 and SEPARATOR_LINE.match(line):
             continue
@@ -127,7 +145,7 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
         try:
             x, y = (float(cell) for cell in cells)
         except ValueError:
-            if not rows and not header and not any(is_number(cell) for cell in cells):
+            if not rows and not header and not any(is_number(c) or BROKEN_NUMBER.fullmatch(c) for c in cells):
                 header = line
                 continue
             if not rows and below is None and len(cells) == 2 and not any(map(NO_UNIT.match, cells)):
@@ -159,14 +177,15 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     try:
         root = ElementTree.fromstring(text)
         _check_tree(path, root)
-        drawing = svgelements.SVG.parse(StringIO(text))
+        metre = _svg_scale(path, root) if scale is None else scale
+        _hide_referenced(root, name)
+        drawing = svgelements.SVG.parse(StringIO(ElementTree.tostring(root, encoding="unicode")))
     except InputError:
         raise
     except (SyntaxError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RecursionError) as error:
         raise InputError(f"{path} is not valid SVG: {first_line(error)[:200]}") from error
     if not isinstance(drawing, svgelements.SVG):
         raise InputError(f"{path} is not valid SVG: its outermost element is {root.tag}")
-    metre = _svg_scale(path, root) if scale is None else scale
     within = [drawing]
     if name is not None:
         kinds = (svgelements.Shape, svgelements.Group, svgelements.Use)
@@ -174,16 +193,25 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
         within = [element for element in named if element.id == name]
         if not within:
             raise unknown_name(name, [str(element.id)[:100] for element in named[:200]])
-    shapes = [within[0]] if isinstance(within[0], svgelements.Shape) else within[0].select()
-    shapes = [shape for shape in shapes if isinstance(shape, svgelements.Shape)]
+    if isinstance(within[0], svgelements.Shape):
+        shapes = within[:1]
+    else:
+        shapes = [shape for shape in within[0].select() if isinstance(shape, svgelements.Shape)]
+        shapes = [shape for shape in shapes if shape.values.get("visibility") not in ("hidden", "collapse")]
     shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
     if not shapes:
         raise InputError(f"{path} has no path")
+    said = f"the path {shapes[0].id}" if shapes[0].id else "the path"
+    for entry, grammar in _GRAMMARS.items():
+        data = str(shapes[0].values.get(entry, ""))
+        read = grammar.match(data)
+        if rest := data[read.end() if read else 0 :].strip():
+            raise InputError(f"{path}: {said} has a mistake in its {entry!r}, at {rest[:40]!r}")
     # transform the pixels of the page back to the user space, because svgelements rounds a millimetre to 3.7795296 px
     curve = abs(svgelements.Path(shapes[0]) * ~svgelements.Matrix(drawing.viewbox_transform or ""))
     curves = [part for part in curve.as_subpaths() if any(not isinstance(s, svgelements.Move) for s in part)]
     if len(curves) != 1:
-        raise InputError(f"{path}: the path {shapes[0].id or ''} has {len(curves)} curves: it must have one")
+        raise InputError(f"{path}: {said} has {len(curves)} curves: it must have one")
     segments = [s for s in curves[0] if not isinstance(s, svgelements.Move)]
     extent = float(np.ptp(np.vstack([_chords(s, np.inf) for s in segments]), axis=0).max())
     points = np.vstack([_chords(s, _CHORD_ERROR * extent) for s in segments])
@@ -197,7 +225,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
 def _check_tree(path: Path, root: Any) -> None:
     """Check the transforms of an SVG drawing, and the number of its elements after each ``<use>`` is replaced by its target.
 
-    Raises InputError if svgelements does not know a transform, or if the drawing has too many elements.
+    Raises InputError if svgelements does not know a transform or its centre, or if the drawing has too many elements.
     """
     named = {element.get("id"): element for element in root.iter() if element.get("id") is not None}
     sizes: dict[int, int] = {}
@@ -214,6 +242,15 @@ def _check_tree(path: Path, root: Any) -> None:
             sizes[id(element)] = 1 + sum(size(child, depth + 1) for child in inside)
         return sizes[id(element)]
 
+    for element in root.iter():
+        sheet = element.text if str(element.tag).rpartition("}")[2] == "style" else element.get("style")
+        own = f"{sheet or ''};transform-origin:{element.get('transform-origin', '')};"
+        moved = element.get("transform") or re.search(r"(?<![\w-])transform\s*:", own)
+        if moved and (centre := _CENTRE.search(own)):
+            raise InputError(
+                f"{path} has a transform about a centre of its own, {centre[0][:60]!r}, which is not read: save the drawing "
+                "with plain transforms, such as rotate(30, x, y)"
+            )
     for transform in filter(None, (element.get("transform") for element in root.iter())):
         other = set(re.findall(r"[^\W\d_]+", transform)) - _TRANSFORMS
         if other:
@@ -223,6 +260,19 @@ def _check_tree(path: Path, root: Any) -> None:
             )
     if size(root, 0) > _ELEMENTS:
         raise InputError(f"{path} has more than {_ELEMENTS} elements with all its uses replaced")
+
+
+def _hide_referenced(root: Any, wanted: str | None) -> None:
+    """Put the elements of an SVG drawing that are drawn by a reference only into ``<defs>``, which svgelements does not draw.
+
+    Those that contain the element with the ``id`` that is wanted stay.
+    """
+    for parent in list(root.iter()):
+        for place, child in enumerate(parent):
+            space, bracket, kind = str(child.tag).rpartition("}")
+            if kind in _REFERENCED and not (wanted and any(inner.get("id") == wanted for inner in child.iter())):
+                parent[place] = parent.makeelement(f"{space}{bracket}defs", {})
+                parent[place].append(child)
 
 
 def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
@@ -243,18 +293,26 @@ def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
 def _svg_scale(path: Path, root: Any) -> float:
     """Return the length of a user unit of an SVG document in metres."""
     lengths: list[float | None] = []
-    for key in ("width", "height"):
-        found = re.fullmatch(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))
-        lengths.append(float(found[1]) * _CSS[found[2]] if found else None)
+    given = [root.get(key, "").strip() for key in ("width", "height")]
+    for length in given:
+        found = re.fullmatch(r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|q|)", length.lower())
+        lengths.append(float(found[1]) * _CSS[found[2]] or None if found else None)
+    unread = [length for length in given if not (length in ("", "auto") or length.endswith("%"))]
+    if lengths == [None, None] and unread:
+        raise InputError(f"{path} is {unread[0][:40]!r} wide or high: it must be a length such as '210mm'")
     box = root.get("viewBox")
     if box is None or lengths == [None, None]:
         return _CSS["px"]
     numbers = re.split(r"[\s,]+", box.strip())
-    if len(numbers) != 4 or not all(is_number(n) for n in numbers) or min(float(n) for n in numbers[2:]) <= 0.0:
+    if (
+        len(numbers) != 4
+        or not all(is_number(n) for n in numbers)
+        or not all(0.0 < float(n) < inf for n in numbers[2:])
+    ):
         raise InputError(
             f"{path} has the viewBox {box!r}: it must be four numbers, the width and the height above zero"
         )
     scales = [length / float(side) for length, side in zip(lengths, numbers[2:]) if length is not None]
     if len(scales) == 2 and abs(scales[1] / scales[0] - 1.0) > 1e-6 and root.get("preserveAspectRatio") == "none":
         raise InputError(f"{path} is stretched: one unit is {scales[0]:.6g} m wide and {scales[1]:.6g} m high")
-    return min(scales)
+    return max(scales) if "slice" in root.get("preserveAspectRatio", "") else min(scales)

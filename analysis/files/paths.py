@@ -98,7 +98,10 @@ def read_text(path: Path) -> str:
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} cannot be read: it is not text in {encoding.removesuffix('-sig').upper()}") from error
+        raise InputError(
+            f"{path} cannot be read: it is not text in {encoding.removesuffix('-sig').upper()}; save it as UTF-8, in a "
+            "spreadsheet as 'CSV UTF-8'"
+        ) from error
     return io.StringIO(text, newline=None).getvalue()
 
 

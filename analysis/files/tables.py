@@ -151,7 +151,8 @@ def read_record(
     def as_number(cell: str) -> str:
         return cell.strip() if separator == "," else cell.strip().replace(",", ".")
 
-    header = [] if not rows or is_number(as_number(rows[0][1][0])) else rows.pop(0)[1]
+    first = as_number(rows[0][1][0]) if rows else "0"
+    header = [] if is_number(first) or BROKEN_NUMBER.fullmatch(first) else rows.pop(0)[1]
     units = [heading_unit(name) for name in header]
     if header and rows and not any(map(NO_UNIT.match, rows[0][1])):
         units = units_below(units, *rows.pop(0)[::-1], path)
@@ -185,12 +186,19 @@ def read_record(
             own = as_number(cells[place]) if place < len(cells) else ""
             column[i] = float(own) if is_number(own) else nan
             if not isfinite(column[i]):
-                raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a finite number")
+                hint = ""
+                if len(own.split()) > 1 and all(map(is_number, own.split())):
+                    hint = "; between the cells there must be commas, semicolons or tabs"
+                raise InputError(
+                    f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a finite number{hint}"
+                )
     return [units[place] if place < len(units) else "" for place in places], list(columns)
 
 
 #: Line that tells Excel which mark is between the cells.
 SEPARATOR_LINE = re.compile(r"\"?sep=", re.IGNORECASE)
+#: A number that Python does not read, such as "1 234", "1,234.5", or one with a minus sign of typography: no heading.
+BROKEN_NUMBER = re.compile(r"[-+\u2212\d.,'\s]*\d[-+\u2212\d.,'\sEeDd]*")
 #: A cell that cannot be a unit below a heading.
 NO_UNIT = re.compile(r"[\s\[(]*[-+.,]*(?:\d|(?:nan|inf|infinity)\s*$)", re.IGNORECASE)
 

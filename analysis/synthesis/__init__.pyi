@@ -44,6 +44,7 @@ from .result.report import assess as assess
 from .result.report import costs as costs
 from .result.report import error_unit as error_unit
 from .result.report import format_poor as format_poor
+from .result.report import format_sense as format_sense
 from .result.report import format_short as format_short
 from .result.report import format_transmission as format_transmission
 from .result.report import headline as headline

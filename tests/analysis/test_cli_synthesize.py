@@ -234,6 +234,20 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
     assert not Path("none").exists()
 
 
+@pytest.mark.parametrize(
+    ("points", "rotation", "noted"),
+    [
+        ([[0, 0], [0, 1], [1, 1], [1, 0]], None, True),
+        ([[0, 0], [1, 0], [1, 1], [0, 1]], None, False),
+        ([[0, 0], [0, 1], [1, 1], [1, 0]], [0.0, -1.5, -3.0, -4.5], False),
+        ([[0, 0], [1, 1], [2, 0], [2, 1], [1, 0], [0, 1]], None, False),
+    ],
+)
+def test_a_clockwise_path_in_step_with_a_counter_clockwise_crank_is_noted(points, rotation, noted) -> None:
+    said = syn.format_sense(syn.TimedPath(points=points, rotation=rotation))
+    assert said.startswith("the points run clockwise") == noted
+
+
 def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(
         CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n'
@@ -248,6 +262,9 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
     result = linkwork("synthesize", "case.toml", "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
     assert "stopped after 1 of 4 problems of the trade-off; what there is is kept" in result.stderr
+    # that there is no linkage would be known only after the whole search
+    assert "none found yet" in result.stdout
+    assert "no linkage" not in result.output
     assert len(Path("out/trade-off.csv").read_text().splitlines()) == 2
     assert Path("out/solutions.csv").exists()
 

@@ -231,6 +231,21 @@ def test_map_of_four_poses_is_what_each_linkage_is_judged(seed: int) -> None:
                 assert found.transmission[i, k] == pytest.approx(least, abs=2e-5)
 
 
+def test_the_best_linkage_is_farthest_from_a_dead_centre_on_the_way_through_the_poses() -> None:
+    def margins(name: str) -> tuple[syn.Guidance | syn.GuidanceMap, list[float]]:
+        found = syn.guidance(syn.load_synthesis_case(EXAMPLES / f"{name}-poses.toml").task)
+        ways = [s.verdicts for s in found.solutions if s.verdicts.sound]
+        return found, [min(v.least_transmission, pi - v.greatest_transmission) for v in ways]
+
+    found, all_five = margins("five")
+    assert all_five == sorted(all_five, reverse=True)
+    found, all_four = margins("four")
+    assert isinstance(found, syn.GuidanceMap)
+    # a linkage whose crank swings may be the best
+    assert all_four[0] == pytest.approx(found.transmission.max(), abs=1e-9)
+    assert all_four == sorted(all_four, reverse=True)
+
+
 def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
     """Pose by pose left out, the dyads of five poses lie on the curve of the other four."""
     task = random_poses(0, 5)

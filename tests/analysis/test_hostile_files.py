@@ -138,7 +138,7 @@ _USES = "".join(f'<g id="a{k + 1}">{f"""<use href="#a{k}"/>""" * 10}</g>' for k 
         ("", '<path d="M0 0A1e-300 1e-300 0 0 1 10 10"/>', "not valid SVG"),
         ('viewBox="0 0 nan 1" width="1mm" height="1mm"', '<path d="M0 0L1 1"/>', "viewBox|without an extent"),
         ('viewBox="0 0 1e400 1" width="1mm" height="1mm"', '<path d="M0 0L1 1"/>', "cannot be read|viewBox"),
-        ('viewBox="0 0 1 1" width="0mm" height="0mm"', '<path d="M0 0L1 1"/>', "cannot be read"),
+        ('viewBox="0 0 1 1" width="0mm" height="0mm"', '<path d="M0 0L1 1"/>', "'0mm' wide or high"),
         ("", '<path transform="scale(0)" d="M0 0L1 1"/>', "without an extent"),
         ("", '<g transform="scale(nan)"><path d="M0 0L1 1"/></g>', "'nan' is neither a transformation"),
         ("", '<path transform="scale(1e308) scale(1e308)" d="M0 0L1 1"/>', "without an extent"),

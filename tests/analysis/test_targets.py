@@ -343,6 +343,7 @@ def test_points_from_csv(tmp_path: Path, text: str) -> None:
         ("x (cm),y (cm)", None, 1e-2),
         ("# x [mm],y [mm]", None, 1e-3),
         ("# x [mm] y [mm]", None, 1e-3),
+        ('"x [mm]","y [mm]"', None, 1e-3),
         ("x [mm] y [mm] # drawn", None, 1e-3),
         ("x [mm],y [mm]", "mm", 1e-3),
         ("x,y", "in", 0.0254),
@@ -390,6 +391,9 @@ def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
         ("x [mm],y [mm]\ncm,cm\n1,2\n", "line 2: the unit 'cm'"),
         ("0,0\n1,inf\n", "line 2: '1,inf' is not finite"),
         ("0,zero\n1,1\n", "line 1"),
+        ("1,234.5;2,000.0\n3;4\n", "line 1"),
+        ("1 234;2 000\n3;4\n", "line 1"),
+        ("\u22121,2\n3,4\n", "line 1"),
         ("x,y\n", "no points"),
         ("", "no points"),
     ],
@@ -406,6 +410,7 @@ SVG = """<svg xmlns="http://www.w3.org/2000/svg" {head}>
   <path id="two" d="M 0 0 L 1 1 M 2 2 L 3 3"/>
   <path id="empty" d=""/>
 </svg>"""
+DRAWN = '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" viewBox="0 0 9 9">{}</svg>'
 WEDGE = np.array([[10.0, -5.0], [30.0, -5.0], [30.0, 5.0]])
 
 
@@ -418,6 +423,9 @@ WEDGE = np.array([[10.0, -5.0], [30.0, -5.0], [30.0, 5.0]])
         ('width="72pt" height="200pt" viewBox="0 0 100,50"', None, 0.254e-3),
         ('width="96" viewBox="0 0 100 50"', None, 0.254e-3),
         ('width="96px" viewBox="0 0 100 50"', None, 0.254e-3),
+        ('width="100Q" height="50 Q" viewBox="0 0 100 50"', None, 0.25e-3),
+        ('width="100MM" viewBox="0 0 100 50"', None, 1e-3),
+        ('width="100mm" height="100mm" viewBox="0 0 100 50" preserveAspectRatio="xMidYMid slice"', None, 2e-3),
         ('width="6pc" viewBox="0 0 100 50"', None, 0.254e-3),
         ('width="100%" height="100%" viewBox="0 0 100 50"', None, 0.0254 / 96),
         ('width=".5in" height="1.2.3in" viewBox="0 0 100 50"', None, 0.0254 / 200),
@@ -458,6 +466,27 @@ def test_named_curves_of_svg(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("before", "name", "end"),
+    [
+        ('<mask id="m"><path d="M0 0L1 1"/></mask>', None, 7.0),
+        ('<marker><path d="M0 0L1 1"/></marker>', None, 7.0),
+        ('<g><symbol id="s"><path d="M0 0L1 1"/></symbol></g>', None, 7.0),
+        ('<symbol id="s"><path d="M0 0L1 1"/></symbol><use href="#s" x="3"/>', None, 4.0),
+        ('<mask id="m"><path id="inner" d="M0 0L1 1"/></mask>', "inner", 1.0),
+        ('<g visibility="hidden"><path id="gone" d="M0 0L1 1"/></g>', None, 7.0),
+        ('<g visibility="hidden"><path id="gone" d="M0 0L1 1"/></g>', "gone", 1.0),
+        ('<path style="transform-origin: 50% 50%" d="M0 0L5 1"/>', None, 5.0),
+        ('<path transform="rotate(90)" transform-origin="0 0px" d="M0 0L1 -5"/>', None, 5.0),
+        ('<path d="m0,0a5-5.0.0 015,5z"/>', None, 0.0),
+    ],
+)
+def test_the_first_path_that_is_seen_is_read(tmp_path: Path, before: str, name: str | None, end: float) -> None:
+    path = save(tmp_path, "a.svg", DRAWN.format(f'{before}<path d="M0 0L7 1"/>'))
+    points, closed = read_points(path, name=name)
+    assert (points[0] if closed else points[-1])[0] == pytest.approx(1e-3 * end)
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("<svg", "not valid SVG"),
@@ -466,6 +495,15 @@ def test_named_curves_of_svg(tmp_path: Path) -> None:
         (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 1 1" preserveAspectRatio="none"'), "stretched"),
         (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 0 1"'), "viewBox"),
         (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 one 1"'), "not valid SVG|viewBox"),
+        (SVG.format(head='width="9em" viewBox="0 0 1 1"'), "'9em' wide or high"),
+        (DRAWN.format('<path id="cut" d="M0 0L1 1L2"/>'), "the path cut has a mistake in its 'd', at 'L2'"),
+        (DRAWN.format('<path d="M0 0L1 1X2 2L3 3"/>'), "the path has a mistake in its 'd', at 'X2 2L3 3'"),
+        (DRAWN.format('<path d="M0 0a1 1 0 2 0 3 3"/>'), "mistake in its 'd', at 'a1 1 0 2 0 3 3'"),
+        (DRAWN.format('<path d="L1 1 2 2"/>'), "mistake in its 'd', at 'L1 1 2 2'"),
+        (DRAWN.format('<polyline points="0,0 1,1 2"/>'), "mistake in its 'points', at '2'"),
+        (DRAWN.format('<path transform="rotate(90)" transform-origin="5 5" d="M0 0L1 1"/>'), "origin:5 5"),
+        (DRAWN.format('<path style="transform-origin:center" transform="scale(2)" d="M0 0L1 1"/>'), "origin:center"),
+        (DRAWN.format("<style>.a{transform:scale(2); transform-box: fill-box}</style>"), "transform-box: fill-box"),
     ],
 )
 def test_bad_svg_is_refused(tmp_path: Path, text: str, message: str) -> None:
@@ -484,5 +522,5 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), unit="kg")
     for content, encoding in ((b"\xe4,0", "UTF-8"), (b"\xff\xfe0", "UTF-16")):
         (tmp_path / "b.csv").write_bytes(content)
-        with pytest.raises(InputError, match=f"it is not text in {encoding}$"):
+        with pytest.raises(InputError, match=f"it is not text in {encoding}; save it as UTF-8"):
             read_points(tmp_path / "b.csv")

@@ -28,7 +28,17 @@ from ..linkage.linkage import (
 )
 from ..linkage.machine import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.constraint import SECOND_LENGTH, stroke
-from ..task.task import Normal, PrecisionPoints, RockerFunction, SliderFunction, Task, UntimedPath, normal_form
+from ..task.task import (
+    Normal,
+    PrecisionPoints,
+    RockerFunction,
+    SliderFunction,
+    Task,
+    TimedPath,
+    UntimedPath,
+    normal_form,
+    turn,
+)
 from .solution import (
     CLOSELY,
     CURVE,
@@ -391,6 +401,21 @@ def format_short(solution: Solution) -> str:
         return ""
     longest = 1e3 * solution.linkage.largest_link
     return f"{' and '.join(short)} beside a link of {longest:.4g} mm: a lower bound of the length makes it possible to build"
+
+
+def format_sense(task: Task) -> str:
+    """Return a note on a clockwise path that is timed by equal steps of a counter-clockwise crank; empty for other tasks."""
+    if not isinstance(task, TimedPath):
+        return ""
+    (x, y), steps = np.asarray(task.points).T, np.asarray(task.rotation)
+    clockwise = 0.5 * float(np.roll(x, -1) @ y - x @ np.roll(y, -1))
+    # a path like an eight has no sense
+    if clockwise <= 0.1 * float(np.ptp(x) * np.ptp(y)) or not np.allclose(steps, turn(len(steps))):
+        return ""
+    return (
+        "the points run clockwise while the crank turns counter-clockwise; with rotation = { from = '0 deg', to = '-360 deg' } "
+        "in [task] the crank turns clockwise, too, which may fit better"
+    )
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

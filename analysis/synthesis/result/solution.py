@@ -506,12 +506,14 @@ def nearest_rotations(
 def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
     """Rank solutions: sound solutions first, then by the task's objective.
 
-    Solutions that are exact to rounding are ranked by their transmission angles.
+    Solutions that are exact to rounding are ranked by their transmission angles during the task: the farthest from a dead
+    centre comes first.
     """
 
     def place(solution: Solution) -> tuple[bool, float, float]:
-        exact = solution.error <= EXACT * normal_form(solution.task).unit ** 2
-        return not solution.verdicts.sound, 0.0 if exact else solution.value, -solution.linkage.least_transmission
+        exact, verdicts = solution.error <= EXACT * normal_form(solution.task).unit ** 2, solution.verdicts
+        off = min(verdicts.least_transmission, pi - verdicts.greatest_transmission)
+        return not verdicts.sound, 0.0 if exact else solution.value, -off
 
     return tuple(sorted(solutions, key=place))
 
