@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.studies.youssef.chapter_5 import SAME_GROUND, listed_boundaries, with_held_angles, with_same_ground
-from analysis.studies.youssef.damping import determinant_errors, equation_without_factor
+from analysis.studies.youssef.damping import determinant_errors, equation_without_factor, orbit_removing_damper
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
     appendix_3_region,
@@ -28,6 +28,7 @@ from analysis.youssef import (
     perturbed_region,
     slider_equation,
 )
+from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
 from .results import check, every, result, statement
@@ -78,6 +79,15 @@ def test_on_the_same_ground_link_the_region_is_narrowest_at_equal_links() -> Non
 def test_varied_coupler_makes_the_widest_region_of_all_figures() -> None:
     cases = statement("5.3", "This region is narrower").cases
     assert [case.computed for case in cases] == pytest.approx([1.59, 1.18, 1.51], abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "known"),
+    [(with_crank(0.1), 0.17856), (with_held_angles(0.8), 0.26130), (with_same_ground(1.2), 0.70063)],
+)
+def test_damper_that_removes_the_region_of_the_true_orbit(mechanism: FiveBarParameters, known: float) -> None:
+    """The known values are from Lagrange's equation of the slider, integrated with its variation by other code."""
+    assert orbit_removing_damper([mechanism]) == pytest.approx(known, abs=2e-5)
 
 
 @pytest.mark.parametrize(("number", "power"), [(1, 1.0), (2, 2.0), (3, 3.0)])

@@ -442,7 +442,11 @@ def judge_sets() -> Statement:
         "none, since counts are exact",
         (
             near("parameters outside", 0.0, np.sum((sets < LOW) | (sets > HIGH)), 0.0),
-            Case(label="quickly and efficiently", computed=None, why="there is no measure of that"),
+            Case(
+                label="quickly and efficiently",
+                computed=None,
+                why="no time and no other way to obtain the sets is given",
+            ),
         ),
     )
 
