@@ -92,7 +92,8 @@ def _steady_statements() -> list[Statement]:
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
     first, second = ({k: transient(k, number) for k in turns} for number in (0, 1))
-    change = max(t.change / np.ptp(t.slider_cm) for t in turns.values())
+    # an error of the integration, so that only its size tells
+    change = float(f"{max(t.change / np.ptp(t.slider_cm) for t in turns.values()):.0e}")
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     later = "with the softer springs the transient lasts longer"
     return [
@@ -101,8 +102,8 @@ def _steady_statements() -> list[Statement]:
             "is shown over the first cycle.",
             text("3.2.1, L1944-1948"),
             "greatest distance of u from the steady motion in the first and the second cycle, relative to its range. For "
-            "*due to*: change of u from cycle to cycle after a start in the steady motion. *Over the first cycle* is read "
-            "as no longer than that",
+            "*due to*: change of u from cycle to cycle after a start in the steady motion, to one digit, since it is an error "
+            "of the integration. *Over the first cycle* is read as no longer than that",
             ALIKE_WORDS,
             (
                 at_least("first cycle, least of the springs", ALIKE, min(first.values())),
@@ -114,8 +115,8 @@ def _steady_statements() -> list[Statement]:
             "The steady state motion is periodic and oscillates about a mean position between the initial position "
             "of the slider and the crank shaft.",
             text("3.2.1, L1948-1954"),
-            "change of u from one cycle to the next, relative to its range; mean of u. The start is at u = 0, the shaft at "
-            f"{shaft:g} cm",
+            "change of u from one cycle to the next, relative to its range, as in the row before; mean of u. The start is at "
+            f"u = 0, the shaft at {shaft:g} cm",
             ALIKE_WORDS,
             (
                 at_most("change, greatest of the springs", ALIKE, change),
@@ -211,7 +212,8 @@ def _shape_statements() -> list[Statement]:
             "360 deg",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
-            "the slider swings on the spring several times a turn; in the limit u is the inertia force over k",
+            "with k = 1e7 and 1e8 dyn/cm the slider also swings on the spring; in the limit u is the inertia force over k, "
+            "which is not linear in the crank angle",
         ),
     ]
 

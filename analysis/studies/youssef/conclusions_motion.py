@@ -118,7 +118,7 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             text("9.1, L7077"),
             "greatest change of the oscillation about the drift from turn to turn, as at L1907, and distance of u at the ends "
             "of the turns from a line, as at L1911, but both until the links are collinear; number of turns until then, when "
-            f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.1f} deg of a straight line (our choice)",
+            f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.2f} deg of a straight line (our choice)",
             f"{ALIKE:g}, the rule for *steady* and *linear*; {FEWEST_TURNS} turns, two for the transient and two to compare; "
             f"{DRIFT_TURNS} turns, as many as we run",
             (

@@ -258,7 +258,8 @@ def compute() -> StudyResult:
         claim="The multipliers are the pin forces. If all second derivatives are integrated, the closure of the loop shows the "
         "error of the integration.",
         assignment="The integrations are those of Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm (our choice), for "
-        f"{STOP:g} s from u = u' = 0 in constant steps, at 420 rpm or in a launch from rest with T0 = 1e8 dyn.cm.",
+        f"{STOP:g} s from u = u' = 0 in constant steps, at 420 rpm or in a launch from rest with T0 = 1e8 dyn.cm. Hamming's "
+        "method begins with three Runge-Kutta steps, each in two halves.",
         columns=columns,
         statements=(*chapter_2_statements(), *_closure_statements(), *_one_step_statements(), *_hamming_statements()),
     )

@@ -30,7 +30,7 @@ SOFT, STIFF = 5e5, 2e6
 #: Crank speed near which the thesis sees higher harmonics (rad/s).
 HARMONIC_SPEED = 27.0
 #: Number of crank angles at which a turn of a free crank is sampled.
-SAMPLES = 256
+SAMPLES = 1024
 
 
 @cache
@@ -77,8 +77,8 @@ class Turns:
     @classmethod
     def from_run(cls, run: Trajectory, start: float = 0.0) -> Turns:
         """Divide a run into turns and return their statistics; the first turn begins at the crank angle ``start`` (rad)."""
-        angle = run["crank.angle"]
-        times = np.interp(np.arange(start, angle[-1], 2.0 * pi), angle, run.time)
+        angle = run["crank.angle"][: forward_samples(run["crank.angle"])]
+        times = CubicSpline(angle, run.time[: len(angle)])(np.arange(start, angle[-1], 2.0 * pi))
         names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic")
         u, v, w, e = (turn_by_turn(run, name, start) for name in names)
         harmonics = 2.0 * CM_PER_METRE / SAMPLES * np.abs(np.fft.rfft(u, axis=1))
@@ -110,11 +110,22 @@ def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float
     return sample_turns(run["crank.angle"], run[output], start)
 
 
+def forward_samples(angle: NDArray[np.float64]) -> int:
+    """Return the number of samples of the crank angle before the crank first stands still or turns back."""
+    return 1 + int(np.argmax(np.append(np.diff(angle) <= 0.0, True)))
+
+
 def sample_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
-    """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES)."""
+    """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES).
+
+    The values are interpolated by cubic splines; the turns end where the crank first stands still or turns back.
+    """
+    n = forward_samples(angle)
+    angle, values = angle[:n], values[:n]
     marks = np.arange(start, angle[-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
-    return np.interp(grid, angle, values)
+    sampled: NDArray[np.float64] = CubicSpline(angle, values)(grid)
+    return sampled
 
 
 def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from linkwork.errors import AssemblyError
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
@@ -23,7 +24,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
-from .free_crank import LOSS, SAMPLES, SOFT, STIFF, UNDAMPED, Turns, coast, damper_cases, turn_by_turn, undamped_range
+from .free_crank import LOSS, SAMPLES, UNDAMPED, Turns, coast, damper_cases, turn_by_turn, undamped_range
 from .runs import (
     ALIKE_WORDS,
     SIGN,
@@ -40,7 +41,9 @@ from .runs import (
 TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Speeds (rpm), by spring (dyn/cm), at which a steadily running crank is released for comparison: above those of the launches.
-RELEASED = {5e5: 600.0, 1e6: 840.0, 2e6: 840.0}
+RELEASED = {5e5: 580.0, 1e6: 820.0, 2e6: 840.0}
+#: Other such speeds with k = 1e6 dyn/cm: after the strongest launch the time depends on the transient of the released crank.
+OTHER_RELEASES = (780.0, 800.0)
 #: Quantity of a plot: its name on the axis, output, factor to its unit, unit.
 Quantity = tuple[str, str, float, str]
 SLIDER: Quantity = ("slider position u", "slider.position", CM_PER_METRE, "cm")
@@ -121,21 +124,20 @@ class Settling(NamedTuple):
 
 
 @cache
-def settling(torque: float, stiffness: float) -> Settling:
-    """Compare the slider position u after a launch with u of a free crank in steady decay.
+def settling(torque: float, stiffness: float, rpm: float) -> Settling:
+    """Compare the slider position u after a launch with u of a free crank in steady decay, released at a speed (rpm).
 
-    They are compared at equal crank angles, in turns of equal mean speed.
+    They are compared at equal crank angles, in turns of equal mean speed, or with the fastest turn of the released crank.
     """
-    launched, steady = launch(torque, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
+    launched, steady = launch(torque, stiffness), coast(stiffness, rpm=rpm)
     (after, turns), (known, waves) = (
         (Turns.from_run(run, 1.0), turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
     )
-    found = []
-    for speed, turn in zip(after.speed, turns):
-        # the speed falls in the steady decay, and np.interp needs rising abscissas
-        wave = np.array([np.interp(-speed, -known.speed, column) for column in waves.T])
-        found.append(np.abs(turn - wave) / np.ptp(wave))
-    distances = np.array(found)
+    # in the steady decay the speed falls
+    first = 1 + int(max(np.flatnonzero(np.diff(known.speed) >= 0.0), default=-1))
+    speed, waves = known.speed[first:], waves[first:]
+    steadily = CubicSpline(speed[::-1], waves[::-1])(np.minimum(after.speed, speed[0]))
+    distances = np.abs(turns - steadily) / np.ptp(steadily, axis=1)[:, None]
     count = last_crossing(distances.ravel(), ALIKE) / SAMPLES
     end = float(np.interp(1.0 + 2.0 * pi * count, launched["crank.angle"], launched.time))
     decaying = after.slider[min(ceil(count), len(after.slider) - 2) :]
@@ -249,13 +251,14 @@ DECAY = "mean of u relative to the turn before, greatest"
 def _settled() -> tuple[Case, ...]:
     """Judge whether the launch with the greatest torque takes longest to reach the steady decay, and whether u then decays."""
     try:
-        *sooner, last = (settling(torque, 1e6) for torque in TORQUES)
+        found = [[settling(torque, 1e6, rpm) for torque in TORQUES] for rpm in (RELEASED[1e6], *OTHER_RELEASES)]
     except AssemblyError:
         return tuple(
             Case(label=label, computed=None, why="the steady motion of a free crank does not stay assembled")
-            for label in ("time", DECAY)
+            for label in ("time, least", DECAY)
         )
-    return (at_least("time", 1.0, last.time / max(x.time for x in sooner)), at_most(DECAY, 1.0, last.decay))
+    ratio = min(last.time / max(x.time for x in sooner) for *sooner, last in found)
+    return (at_least("time, least", 1.0, ratio), at_most(DECAY, 1.0, max(last.decay for *_, last in found)))
 
 
 def launch_speeds() -> StudyResult:
@@ -352,7 +355,10 @@ def draw_torque_over_time(result: StudyResult) -> Figure:
 def launch_positions() -> StudyResult:
     """Compute the slider position after launches with the three torques."""
     runs = _torque_runs()
-    largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
+    positions = {label: run["slider.position"] for label, run in runs.items()}
+    # u is greatest at the start if the slider never passes it
+    tops = {label: greatest(runs[label].time, u)[1] if u.argmax() else u[0] for label, u in positions.items()}
+    largest = max(float(np.abs(u).max()) for u in positions.values())
     *lesser, shift = (abs(Turns.from_run(run, 1.0).slider.mean()) for run in runs.values())
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
@@ -364,7 +370,9 @@ def launch_positions() -> StudyResult:
             "steady state decay.",
             text("3.2.2, L2155-2159"),
             f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay (as at Fig 3.10), relative "
-            "to the longest such time with the other torques; from then on, mean of u relative to the turn before",
+            "to the longest such time with the other torques; from then on, mean of u relative to the turn before. The free "
+            f"crank of Fig 3.10 is released at {OTHER_RELEASES[0]:g}, {OTHER_RELEASES[1]:g} and {RELEASED[1e6]:g} rpm (our "
+            "choice), since its own transient affects the time",
             SIGN,
             _settled(),
         ),
@@ -381,10 +389,10 @@ def launch_positions() -> StudyResult:
                     at_most(
                         f"greatest u; {label}",
                         ALIKE,
-                        run["slider.position"].max() / largest,
+                        top / largest,
                         why="after the weakest launch the slider moves to both sides of its start",
                     )
-                    for label, run in runs.items()
+                    for label, top in tops.items()
                 ),
                 at_least(
                     "least u of all",
@@ -446,7 +454,8 @@ def launch_positions_by_spring() -> StudyResult:
     runs = _spring_runs()
     apart = np.ptp([run_acceleration(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
     apart /= np.ptp([run_acceleration(1e8, k)["slider.position"] for k in STIFFNESSES])
-    settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
+    settled = [settling(1e8, k, RELEASED[k]) for k in STIFFNESSES]
+    by_torque = [settling(torque, 1e6, RELEASED[1e6]) for torque in TORQUES]
     times = {name: [x.time for x in settlings] for name, settlings in (("springs", settled), ("torques", by_torque))}
     return _launch_result(
         "The slider moves alike with all springs while the torque acts. A transient follows, whose duration depends on "
@@ -466,9 +475,10 @@ def launch_positions_by_spring() -> StudyResult:
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
             "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and "
-            "in the last turn within 1 s. The steady decay is u of a free crank at equal crank angle and mean speed, "
-            f"released at {RELEASED[STIFF]:g} rpm, or with k = 5e5 dyn/cm at {RELEASED[SOFT]:g} (our choice). Then the mean "
-            f"of u relative to the turn before, once u is within {ALIKE:g} of that decay",
+            "in the last turn within 1 s, the latter to one digit. The steady decay is u of a free crank at equal crank angle "
+            "and mean speed of the turn, released from its steady motion at "
+            f"{', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our choice). Then the mean of u "
+            f"relative to the turn before, once u is within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
@@ -476,7 +486,7 @@ def launch_positions_by_spring() -> StudyResult:
                     for label, x in zip(runs, settled)
                     for case in (
                         at_least(f"{label}, first turn", ALIKE, x.first),
-                        at_most(f"{label}, last turn", ALIKE, x.last),
+                        at_most(f"{label}, last turn", ALIKE, float(f"{x.last:.0e}")),
                     )
                 ),
                 at_most(DECAY, 1.0, max(x.decay for x in settled)),

@@ -157,7 +157,7 @@ def drift_result() -> StudyResult:
         for weak, strong in zip(folds, list(folds)[1:])
     ]
     (rate, start), (other_rate, other_start) = runs[5e5].line, runs[1e6].line
-    collinear = f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.1f} deg of a straight line (our choice)"
+    collinear = f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.2f} deg of a straight line (our choice)"
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
     columns |= {f"slider position u; {_mu(mu)} [cm]": run.until_collinear for mu, run in runs.items()}
     return StudyResult(
