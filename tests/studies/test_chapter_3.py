@@ -160,6 +160,18 @@ class TestFreeMotion:
         assert u == pytest.approx(published.STEADY_U_CM, abs=1e-6)
         assert v == pytest.approx(published.STEADY_U_RATE_CM_S, abs=1e-4)
 
+    @pytest.mark.parametrize("quarter", [1, 2, 3])
+    def test_release_at_another_angle_of_the_steady_motion(self, quarter: int) -> None:
+        """A run at constant speed, sampled every quarter of a turn, passes through the state of the release."""
+        speed = 14.0 * np.pi
+        steady = simulate(
+            runs.table_3_1(free_crank.STIFF), Inputs(speed=speed), stop_time=20.0 / 7.0 + 1.0 / 7.0, step=1.0 / 28.0
+        )
+        free = free_crank.coast(free_crank.STIFF, release=0.5 * np.pi * quarter)
+        assert free["crank.angle"][0] == pytest.approx(0.5 * np.pi * quarter)
+        for name, tolerance in (("slider.position", 1e-6), ("slider.velocity", 1e-4)):
+            assert free[name][0] == pytest.approx(steady[name][80 + quarter], abs=tolerance)
+
     def test_what_is_measured_over_a_turn(self) -> None:
         angle = np.linspace(0.5, 0.5 + 8.0 * np.pi, 20001)
         run = Recorded(

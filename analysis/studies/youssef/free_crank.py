@@ -34,15 +34,17 @@ SAMPLES = 1024
 
 
 @cache
-def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Trajectory:
-    """Simulate the mechanism of Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed (rpm).
+def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED, release: float = 0.0) -> Trajectory:
+    """Simulate the mechanism of Table 3.1 without torque, released from its steady motion at a speed (rpm).
 
-    The steady motion has the thesis's damper, the free motion has ``damping`` (dyn.s/cm).
+    It is released at the crank angle ``release`` (rad). The steady motion has the thesis's damper, the free motion has
+    ``damping`` (dyn.s/cm).
     """
     period, speed = 60.0 / rpm, rpm * RAD_S_PER_RPM
-    steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=20.0 * period, step=period)
+    turns = 20.0 + release / (2.0 * pi)
+    steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=turns * period, step=turns * period)
     u, v = (float(steady[name][-1]) for name in ("slider.position", "slider.velocity"))
-    initial = InitialState(crank_speed=speed, slider_position=u, slider_velocity=v)
+    initial = InitialState(crank_angle=release, crank_speed=speed, slider_position=u, slider_velocity=v)
     return simulate(table_3_1(stiffness, damping), initial=initial, stop_time=10.0 if damping else 4.0, step=5e-4)
 
 
@@ -98,6 +100,11 @@ class Turns:
     def shown(self) -> int:
         """Return the number of turns up to the first whose mean crank speed is below `HARMONIC_SPEED`, this turn included."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
+
+    @property
+    def resonance(self) -> float:
+        """Return the mean crank speed (rad/s) at which the slider's second harmonic over the speed squared is greatest."""
+        return self.speed_of_greatest(self.second / self.speed**2)
 
     def speed_of_greatest(self, values: NDArray[np.float64]) -> float:
         """Return the mean crank speed (rad/s) at which values, one for each turn, are greatest, interpolated between turns."""
@@ -427,7 +434,8 @@ def stiff_phase_plane() -> StudyResult:
     # the mean speed falls from turn to turn
     seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
     # the speeds at which the second harmonic is greatest: over the first, and over its force
-    most, resonance = (stiff.speed_of_greatest(stiff.second / by) for by in (stiff.first, stiff.speed**2))
+    most, resonance = stiff.speed_of_greatest(stiff.second / stiff.first), stiff.resonance
+    elsewhere = [Turns.from_run(coast(STIFF, release=x), x).resonance for x in (0.5 * pi, pi, 1.5 * pi)]
     parameters, over_turn = table_3_1(STIFF), half_natural_frequencies(STIFF)
     half, about = 0.5 * natural_frequency(parameters), ABOUT * HARMONIC_SPEED
     # an oscillator with this damping ratio swings most at sqrt(1 - 2 ratio^2) of its natural frequency
@@ -463,6 +471,8 @@ def stiff_phase_plane() -> StudyResult:
                     ),
                 ),
             ),
+            "the speed of the greatest second harmonic over the speed squared is at the limit: with the torque removed at 90, "
+            f"180 and 270 deg, it is {elsewhere[0]:.2f}, {elsewhere[1]:.2f} and {elsewhere[2]:.2f} rad/s",
         ),
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",

@@ -373,7 +373,7 @@ def _simplification() -> list[Statement]:
             "The coefficients B1, C1, H1, P1, [...], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
             "least a factor [...] in the worst cases.",
             text("4.3, L2797-2801"),
-            why="the fifth coefficient and the factor cannot be read, and without the factor *much smaller* has no measure. "
+            why="the fifth coefficient cannot be read, nor the factor, which says how much smaller they are. "
             "With the conditions of 4.5 and I4 = 1 the greatest of the coefficients as printed, E1, is "
             f"{greatest_varying_part():.2f} of A1",
         ),
