@@ -194,6 +194,14 @@ class TestFreeMotion:
         # 0.08 of 3, and 5.2 squared less 4.8 squared of 25.02
         assert turns.energy_share == pytest.approx([(0.08 / 3.0) / (4.0 / 25.02)] * 3, rel=1e-3)
 
+    def test_mean_of_a_turn_that_does_not_end_where_it_begins(self) -> None:
+        angle = np.linspace(0.0, 5.0 * np.pi, 5001)
+        names = ("slider.velocity", "crank.speed", "energy.kinetic")
+        run = Recorded(
+            {"crank.angle": angle, "slider.position": angle, **dict.fromkeys(names, 1.0 + angle)}, time=angle
+        )
+        assert free_crank.Turns.from_run(run).slider == pytest.approx([100.0 * np.pi, 300.0 * np.pi], rel=1e-9)
+
     def test_turns_end_where_the_crank_turns_back(self) -> None:
         angle = np.concatenate([np.linspace(0.0, 14.0, 1401), np.linspace(13.99, 0.0, 1400)])
         turns = free_crank.sample_turns(angle, np.sin(angle))

@@ -80,7 +80,11 @@ class Turns:
     def from_run(cls, run: Trajectory, start: float = 0.0) -> Turns:
         """Divide a run into turns and return their statistics; the first turn begins at the crank angle ``start`` (rad)."""
         angle = run["crank.angle"][: forward_samples(run["crank.angle"])]
-        times = CubicSpline(angle, run.time[: len(angle)])(np.arange(start, angle[-1], 2.0 * pi))
+        marks, both = (
+            np.arange(start, angle[-1], 2.0 * pi),
+            np.array([run.time, run["slider.position"]])[:, : len(angle)],
+        )
+        times, positions = CubicSpline(angle, both, axis=1)(marks)
         names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic")
         u, v, w, e = (turn_by_turn(run, name, start) for name in names)
         harmonics = 2.0 * CM_PER_METRE / SAMPLES * np.abs(np.fft.rfft(u, axis=1))
@@ -88,7 +92,8 @@ class Turns:
             ends=times[1:],
             speed=2.0 * pi / np.diff(times),
             speed_range=np.ptp(w, axis=1),
-            slider=CM_PER_METRE * u.mean(axis=1),
+            # by the trapezoidal rule: a turn does not end where it begins
+            slider=CM_PER_METRE * (u.mean(axis=1) + 0.5 * np.diff(positions) / SAMPLES),
             slider_range=CM_PER_METRE * np.ptp(u, axis=1),
             velocity_range=CM_PER_METRE * np.ptp(v, axis=1),
             first=harmonics[:, 1],
