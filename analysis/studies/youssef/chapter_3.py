@@ -92,8 +92,7 @@ def _steady_statements() -> list[Statement]:
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
     first, second = ({k: transient(k, number) for k in turns} for number in (0, 1))
-    # an error of the integration, so that only its size tells
-    change = float(f"{max(t.change / np.ptp(t.slider_cm) for t in turns.values()):.0e}")
+    change = max(t.relative_change for t in turns.values())
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     later = "with the softer springs the transient lasts longer"
     return [

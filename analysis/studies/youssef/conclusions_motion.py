@@ -102,12 +102,13 @@ def judge_constant_speed() -> tuple[Statement, ...]:
             "transient followed by periodic oscillations of period [2 pi] of the crank angle.",
             text("9.1, L7071"),
             "greatest distance of u in the first turn from the steady motion; difference of u from one turn of the crank to "
-            "the next after 8 s (our choice); both relative to the range of the steady motion, at 420 rpm",
+            "the next after 8 s (our choice), to one digit, since it is an error of the integration; both relative to the "
+            "range of the steady motion, at 420 rpm",
             f"{ALIKE:g}, the rule for *steady*: more than this for a transient, at most this for periodic oscillations",
             (
                 at_least("transient, least of the springs", ALIKE, min(map(transient, STIFFNESSES))),
                 *(
-                    at_most(f"periodic; k = {plain(k)} dyn/cm", ALIKE, steady_k.change / np.ptp(steady_k.slider_cm))
+                    at_most(f"periodic; k = {plain(k)} dyn/cm", ALIKE, steady_k.relative_change)
                     for k, steady_k in steady.items()
                 ),
             ),

@@ -76,6 +76,11 @@ class SteadyTurn:
     torque: NDArray[np.float64]
     change: float
 
+    @property
+    def relative_change(self) -> float:
+        """Return `change` relative to the range of u, to one digit, since it is an error of the integration."""
+        return float(f"{self.change / np.ptp(self.slider_cm):.0e}")
+
 
 @cache
 def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
