@@ -6,6 +6,7 @@ evenly spaced positions of a turn, finds the equilibrium of all free coordinates
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -183,8 +184,6 @@ def natural_modes(
 
 def _check_gap(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> None:
     """Raise AssemblyError if the links come to the limit of assembly on the straight way between two equilibria."""
-    from scipy.optimize import minimize_scalar
-
     p = one.parameters.constants()
     idle, begin, end = mechanism.idle_inputs(p), np.array(one.state), np.array(other.state)
 
@@ -196,8 +195,11 @@ def _check_gap(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> No
             return float(mechanism.equations.clearance(state(share), idle, p))
         return 0.0
 
-    least = minimize_scalar(clearance, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-6})
-    mechanism.check_assembly(state(least.x), p)
+    share, width = 0.5, 0.5
+    while width > 1e-6:
+        around = np.linspace(max(share - width, 0.0), min(share + width, 1.0), 9).tolist()
+        share, width = min(around, key=clearance), 0.25 * width
+    mechanism.check_assembly(state(share), p)
 
 
 def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int, float]:
@@ -223,9 +225,16 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int
     return {n: float(start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
 
 
-def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:
-    from scipy.optimize import linear_sum_assignment
+def _pair(likeness: FloatArray) -> Iterable[tuple[int, int]]:
+    """Return the pairs of row and column with the greatest sum of likeness, each row and column in one pair at most."""
+    if len(likeness) == 1:
+        return zip(range(1), range(likeness.shape[1]))
+    from scipy.optimize import linear_sum_assignment  # takes a third of a second
 
+    return zip(*linear_sum_assignment(likeness, maximize=True))
+
+
+def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:
     values, vectors = np.linalg.eig(matrices.A)
     size, shape = matrices.M.shape[-1], matrices.M.shape[:2]
     frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
@@ -239,7 +248,7 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
         products = np.outer((known.conj() * (mass @ known)).real.sum(axis=0), energies.sum(axis=0))
         likeness = np.full(products.shape, _NEW)
         np.divide(np.abs(known.conj().T @ mass @ shapes) ** 2, products, out=likeness, where=products > 0.0)
-        for k, own in zip(*linear_sum_assignment(likeness, maximize=True)):
+        for k, own in _pair(likeness):
             pole, known[:, k] = poles[oscillating[own]], shapes[:, own]
             shares[j, k] = energies[:, own] / energies[:, own].sum()
             frequencies[j, k], ratios[j, k] = abs(pole), -pole.real / abs(pole)

@@ -215,8 +215,8 @@ def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
 
     Entry (n, k) is coefficient n - k of the series; the shape is (size, size).
     """
-    coefficients = series.to_order(size).exponential[size:]
-    return np.asarray(scipy.linalg.toeplitz(coefficients[:size], coefficients[:size].conj()))
+    index = np.arange(size)
+    return series.to_order(size).exponential[size + index[:, None] - index]
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:

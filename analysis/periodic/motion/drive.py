@@ -11,6 +11,7 @@ from numbers import Real
 from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
@@ -19,6 +20,7 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, find_mechanism, variable_units
+from ...numerics.cache import code_folder, load_or_make
 from ...run import (
     MOST_TURNS,
     InductionMotor,
@@ -724,8 +726,6 @@ def spread_starts(
     ranges : tuple of ndarray, optional
         Result of `start_ranges`, for callers that take several sets.
     """
-    from scipy.stats import qmc  # takes half a second
-
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
     rest = flow.rest[:half]
@@ -733,9 +733,7 @@ def spread_starts(
     around = mean_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
     own = np.minimum(rest - low, high - rest)
-    filled, further = (
-        qmc.Sobol(flow.size, rng=seed).random(n) for seed, n in ((number, count), ([number, 1], count // 2))
-    )
+    filled, further = _sequence(flow.size, count, number), _sequence(flow.size, count // 2, number, 1).copy()
     further[:, :half] = _DEPTH ** -further[:, :half]
     ellipses = [(rest, own, filled), (rest, own, further)]
     if (np.maximum(rest - low, high - rest) > _ONE_SIDED * own).any():
@@ -751,3 +749,17 @@ def spread_starts(
             found[:, -1] *= slow + (fast - slow) * sequence[:, -1]
         sets.append(found)
     return np.vstack(sets)
+
+
+@cache
+def _sequence(size: int, count: int, *seed: int) -> NDArray[np.float64]:
+    """Return the first points of a scrambled Sobol sequence, shape (count, size); they are kept in the cache on disk."""
+
+    def make() -> bytes:
+        from scipy.stats import qmc  # takes half a second
+
+        points: bytes = qmc.Sobol(size, rng=seed).random(count).tobytes()
+        return points
+
+    name = "-".join(map(str, (scipy.__version__, size, count, *seed)))
+    return np.frombuffer(load_or_make(code_folder("sequences") / name, make)).reshape(count, size)
