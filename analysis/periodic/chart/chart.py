@@ -491,7 +491,7 @@ class _Survey:
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Return whether a traced boundary of the same kind and motion passes through, or close to, a special point."""
         orbit = special.orbit
-        scale = orbit.scale * motion_sizes([orbit])
+        scale = orbit.scale * motion_sizes(orbit, orbit.amplitudes)
         for boundary in self.traced:
             if boundary.kind is not special.kind or boundary.motion not in _MOTION:
                 continue
@@ -587,7 +587,7 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 
     This is so if the orbit's start is near the start of an orbit at one of the grid points around ``place``.
     """
-    scale = orbit.scale * motion_sizes([orbit])
+    scale = orbit.scale * motion_sizes(orbit, orbit.amplitudes)
     distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
 

@@ -135,17 +135,19 @@ class Branch(NotebookResult):
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
             values = _turn_columns(self.orbits[0], turns[0])
-            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
-        unit = f" [{self.family.unit}]" if self.family.unit else ""
-        largest = self.largest_multiplier
-        signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
-        first = {
-            f"{self.family.name}{unit}": self.parameter,
-            "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
-            "largest multiplier [1]": largest,
-            "stable (1), marginal (0), unstable (-1)": signs,
-        }
-        return first | self._table
+            unit = f" [{self.family.unit}]" if self.family.unit else ""
+            largest = self.largest_multiplier
+            signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
+            first = {
+                f"{self.family.name}{unit}": self.parameter,
+                "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
+                "largest multiplier [1]": largest,
+                "stable (1), marginal (0), unstable (-1)": signs,
+            }
+            self._table.update(
+                first | {name: np.array([value(turn) for turn in turns]) for name, value in values.items()}
+            )
+        return dict(self._table)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the branch as a CSV table with one row per point; the columns are those of `columns`."""
@@ -284,7 +286,7 @@ def switch(
     begun = replace(
         orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
     )
-    follower = _follower(family, begun, settings, sizes=motion_sizes([orbit]))
+    follower = _follower(family, begun, settings, sizes=motion_sizes(orbit, orbit.amplitudes))
     # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy - (-1.0) ** (times - 1) * np.eye(len(scale))) * scale / scale[:, None]
@@ -301,16 +303,15 @@ def switch(
     raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
 
 
-def motion_sizes(orbits: Sequence[PeriodicOrbit]) -> NDArray[np.float64]:
+def motion_sizes(orbit: PeriodicOrbit, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return for each component of y how large motions are, relative to the scale: thirty times the amplitude, 1 at most.
 
-    Motions may be much smaller than the links that give the scale.
+    Motions may be much smaller than the links that give the scale, which is that of ``orbit``.
     """
-    flow, scale = orbits[0].flow, orbits[0].scale
-    free = len(flow.free)
-    amplitudes = np.max([orbit.amplitudes for orbit in orbits], axis=0)[:free] / scale[:free]
-    sizes = np.where(amplitudes > 0.0, np.minimum(30.0 * amplitudes, 1.0), 1.0)
-    return np.concatenate([sizes, sizes, np.ones(flow.size - 2 * free)])
+    free = len(orbit.flow.free)
+    shares = amplitudes[:free] / orbit.scale[:free]
+    sizes = np.where(shares > 0.0, np.minimum(30.0 * shares, 1.0), 1.0)
+    return np.concatenate([sizes, sizes, np.ones(orbit.flow.size - 2 * free)])
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
@@ -615,7 +616,8 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
     parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
-    scale = np.append(np.max([o.scale for o in ends], axis=0) * motion_sizes(branch.orbits), width)
+    sizes = motion_sizes(branch.orbits[0], branch.amplitudes.max(axis=0))
+    scale = np.append(np.max([o.scale for o in ends], axis=0) * sizes, width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     away = ends[0].flow.remove_turns(points[:, :-1] - motion)
     near = np.abs(away / scale[:-1]).max(axis=1).argmin()
