@@ -93,7 +93,8 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
     common.show_table(f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, styles=styles)
     if not found.met:
-        common.note(f"none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
+        so_far = " so far" if stopped else ""
+        common.note(f"none meets the tolerance{so_far}; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
 
 

@@ -100,7 +100,7 @@ class StrategyInterrupted(Interrupted):
 
     def __init__(self, strategy: Strategy | None) -> None:
         self.strategy = strategy
-        super().__init__(f"stopped after {len(strategy.steps) if strategy else 0} mechanisms")
+        super().__init__(f"stopped after {format_count(len(strategy.steps) if strategy else 0, 'mechanism')}")
 
 
 @in_si(bounds=UNITS, stroke="m", second_crank="m")

@@ -352,7 +352,8 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
     strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
     result = linkwork(tables(strategy=strategy, slider={}), "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
-    assert "stopped after 1 mechanisms; the best so far is kept" in result.output
+    assert "none meets the tolerance so far; the nearest is kept: four-bar" in result.output
+    assert "stopped after 1 mechanism; the best so far is kept" in result.output
     assert (tmp_path / "out" / "report.txt").exists()
 
 

@@ -263,7 +263,7 @@ def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: i
         raise syn.SynthesisInterrupted(replace(real(*arguments, **more), complete=False), 1, 4)
 
     monkeypatch.setattr(strategy_module, "synthesize", stopped)
-    with pytest.raises(StrategyInterrupted, match=f"stopped after {stop + best} mechanisms") as caught:
+    with pytest.raises(StrategyInterrupted, match=f"stopped after {stop + best or 'no'} mechanism") as caught:
         strategy(replace(BASE, pivot=syn.SliderMotion(series, 0.4)), 1e-20 * MM2, starts=1, bounds=links_of(BASE))
     kept = caught.value.strategy
     if stop + best == 0:

@@ -498,6 +498,10 @@ def test_the_least_mechanical_advantage_lies_between_targets_that_are_dead_centr
     turned = np.linspace(0.0, 2.0 * pi, 4001)
     fastest = np.abs(np.gradient(np.unwrap(swing.linkage.rocker_angle(turned)), turned)).max()
     assert f"per torque on the crank: at least {1.0 / fastest:.3g} during the task" in syn.report(swing)
+    # the slow part takes 1.1/2.1 of a turn, clockwise if the swing is
+    for way in (1, -1):
+        swing = syn.synthesize(syn.QuickSwing(swing=f"{60 * way} deg", time_ratio=1.1), constraints=[]).best
+        assert f"rocker at rest at crank rotations of 0.00, {way * 360 * 1.1 / 2.1:.2f} deg" in syn.report(swing)
 
 
 def test_a_crank_that_cannot_turn_on_has_no_advantage_in_its_toggle() -> None:

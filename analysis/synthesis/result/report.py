@@ -469,7 +469,7 @@ class Assessment:
         else:
             head += f"\nsecond crank at D: {format_ratio(pivot.ratio)} turns for one of the first"
         if pivot is not None:
-            head += _rotation_line("toggles", toggles(linkage))
+            head += _rotation_line("toggles", toggles(linkage), solution.direction)
         if straight := solution.straight():
             head += f"\n{straight}"
         if solution.variants:
@@ -535,7 +535,8 @@ def _limit_lines(solution: Solution) -> str:
     linkage, at = solution.linkage, solution.rotation
     begin, end = (0.0, 2.0 * pi) if whole_turn(solution.task, at) else (float(at.min()), float(at.max()))
     last, motions, what = linkage.driven
-    lines = _rotation_line(f"{last} at rest", dead_centres(linkage)) + _rotation_line("toggles", toggles(linkage))
+    lines = _rotation_line(f"{last} at rest", dead_centres(linkage), solution.direction)
+    lines += _rotation_line("toggles", toggles(linkage), solution.direction)
     ratio = time_ratio(linkage)
     if ratio is not None:
         lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
@@ -547,9 +548,15 @@ def _limit_lines(solution: Solution) -> str:
     return lines
 
 
-def _rotation_line(what: str, places: Sequence[float]) -> str:
-    """Return a line with the title ``what`` and crank rotations in degrees; empty if ``places`` is empty."""
-    return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
+def _rotation_line(what: str, places: Sequence[float], direction: float) -> str:
+    """Return a line with the title ``what`` and crank rotations in degrees; empty if ``places`` is empty.
+
+    The rotations are within a turn in the direction of the crank: negative if it turns clockwise.
+    """
+    if not places:
+        return ""
+    within = sorted(degrees(direction * at % (2.0 * pi)) for at in places)
+    return f"\n{what} at crank rotations of {', '.join(f'{direction * at + 0.0:.2f}' for at in within)} deg"
 
 
 def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str, str, str]]:
