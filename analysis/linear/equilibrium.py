@@ -155,7 +155,8 @@ class Equilibrium:
     def potential(self) -> float:
         """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at zero displacement.
 
-        Force laws of springs, and loads in the axes of a body, are left out.
+        Left out are force laws of springs, loads in the axes of a body, torques on bodies, and drives of joints that are no
+        degrees of freedom.
         """
         mechanism = find_mechanism(self.parameters)
         work = 0.0
@@ -397,7 +398,7 @@ def find_equilibrium(
     guess : array_like, optional
         All coordinates (rad, m) to start from; the values for held degrees of freedom are ignored. Without a guess the stable
         equilibrium of least `Equilibrium.potential` is returned or, if none is stable, the equilibrium of least potential. The
-        potential does not include force laws of springs: of several stable equilibria under such laws choose one by a guess.
+        potential leaves out some forces, such as the laws of springs: then choose one of several stable equilibria by a guess.
 
     Raises
     ------
