@@ -18,6 +18,7 @@ from analysis.studies.youssef import (
     no_spring,
     runs,
 )
+from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
@@ -201,6 +202,10 @@ class TestFreeMotion:
             {"crank.angle": angle, "slider.position": angle, **dict.fromkeys(names, 1.0 + angle)}, time=angle
         )
         assert free_crank.Turns.from_run(run).slider == pytest.approx([100.0 * np.pi, 300.0 * np.pi], rel=1e-9)
+
+    def test_too_few_turns_to_compare(self) -> None:
+        with pytest.raises(InputError, match="1 turns to compare"):
+            runs.greatest_ratio(np.array([3.0]))
 
     def test_turns_end_where_the_crank_turns_back(self) -> None:
         angle = np.concatenate([np.linspace(0.0, 14.0, 1401), np.linspace(13.99, 0.0, 1400)])

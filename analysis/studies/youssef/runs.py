@@ -13,7 +13,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import AssemblyError
+from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3_1
 
@@ -122,7 +122,9 @@ def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
 
 
 def greatest_ratio(values: NDArray[np.float64]) -> float:
-    """Return the greatest ratio of a value to its predecessor."""
+    """Return the greatest ratio of a value to its predecessor; raise an InputError if there is only one, or none."""
+    if len(values) < 2:
+        raise InputError(f"{len(values)} turns to compare: there must be at least 2; change the parameters less")
     return float((values[1:] / values[:-1]).max())
 
 
