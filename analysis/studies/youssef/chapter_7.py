@@ -135,7 +135,7 @@ def family() -> StudyResult:
             Statement(
                 "Such 'isochronous' curves, which are arcs of circles centred at the corresponding fixed position, of B, can "
                 "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
-                "continuous variation of U is specified. Alternatively, they may be regarded as providing a starting point "
+                "continuous variation of U is specified. Alternatively, they may be regarded as[] providing a starting point "
                 "from which a desired variation in U may be deduced.",
                 text("7.0, L5260-5272"),
                 f"distance of P from B minus r, at {TURN.size - 1} crank angles and {ALONG.size} values of U from "

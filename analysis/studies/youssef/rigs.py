@@ -187,12 +187,10 @@ def peak_rise(spring: str, order: int) -> float:
 
     The result is 0 without such a maximum.
     """
-    tops = [
-        e
-        for e in motions(spring).maxima()
-        if abs(e.parameter / RAD_S_PER_RPM * order / natural_speed(spring) - 1.0) < 0.1
-    ]
-    lows = [e for e in motions(spring).minima() if tops and e.parameter > tops[0].parameter]
+    place = natural_speed(spring) / order
+    found = response(spring, 0.9 * place, 1.25 * place, COARSE)
+    tops = [e for e in found.maxima() if e.parameter < 1.1 * place * RAD_S_PER_RPM]
+    lows = [e for e in found.minima() if tops and e.parameter > tops[0].parameter]
     return tops[0].amplitude / lows[0].amplitude - 1.0 if lows else 0.0
 
 

@@ -240,9 +240,9 @@ def _positions() -> tuple[Statement, ...]:
             (at_most("greatest difference", 1e-3, off.max(), "l3"),),
         ),
         Statement(
-            "If the argument of the square root term in (7.14) is negative then (7.11a) is not true and (7.11b) is the correct "
-            "solution of (7.10b). In physical reality this is equivalent to the coupler being in a straight line with the "
-            "desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
+            "If the argument of the square root term in (7.14) is negative then [(7.11a)] is not true and [(7.11b)] is the "
+            "correct solution of [(7.10b)]. In physical reality this is equivalent to the coupler being in a straight line "
+            "with the desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
             text("7.3.1, L5675-5685"),
             f"at the {standing.size} points where it is negative: least distance of C from the slider's line, relative to "
             "l4, with the coupler pointing at the point. Then, at the least error, the share of rockers perpendicular to "
