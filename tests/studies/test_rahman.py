@@ -434,6 +434,19 @@ class TestMethod:
         assert missed in [pytest.approx(n / 82.0) for n in (66, 67)]
         assert missed + wrong == pytest.approx(78.0 / 82.0)
 
+    @pytest.mark.long
+    @pytest.mark.parametrize(
+        ("cases", "share"), [(iteration.PLANES, 0.05), (method.OUT, 0.12)], ids=["in the plane", "out of it"]
+    )
+    def test_share_of_poor_starts_at_which_rounding_decides(self, cases: tuple[Case, ...], share: float) -> None:
+        poor = (-120.0, -60.0, 60.0, 120.0, 180.0)
+        one, other = (
+            np.concatenate([found.settled for found in iteration.endings(cases, tuple(x + off for x in poor))])
+            for off in (0.0, 1e-10)
+        )
+        assert np.mean(one != other) == pytest.approx(share, abs=0.02)
+        assert np.mean(one) == pytest.approx(np.mean(other), abs=0.02)
+
     @pytest.mark.slow
     @pytest.mark.parametrize(
         ("case", "printed", "mended"), list(zip(method.ROW_F, (84.0, 215.0), (40.0, 66.0))), ids=["S1", "310"]
