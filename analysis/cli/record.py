@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from linkwork.errors import InputError, ParameterError
 
@@ -69,8 +69,8 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     unit, kind, size = _column_unit(own, options["unit"], "--unit", ("m", "rad"))
     note_assumed_units(Path(record), (heading or options["time_unit"], own or options["unit"]), ("s", "m"))
     t = t * second
-    first = quantity(options["first"], "s", "--from") if options["first"] else -np.inf
-    last = quantity(options["last"], "s", "--to") if options["last"] else np.inf
+    first = quantity(options["first"], "s", "--from") if options["first"] else -inf
+    last = quantity(options["last"], "s", "--to") if options["last"] else inf
     kept = ~((t < first) | (t > last))
     least = LEAST_SWING if options["least_swing"] is None else options["least_swing"]
     decay = fit_decay(t[kept], x[kept], friction=options["friction"], least_swing=least)
@@ -134,7 +134,7 @@ def _column_unit(own: str, given: str | None, option: str, kinds: tuple[str, ...
             raise InputError(
                 f"the times are in {own!r} by their heading, which is no unit of time: give {option}"
             ) from None
-        return own, "", np.nan
+        return own, "", nan
     if given and found[1:] != chosen[1:]:
         raise click.UsageError(f"{option} {given}: the column's heading says {own}")
     return found
@@ -160,7 +160,7 @@ def _result_rows(
     if moving is not None:
         stiffness = decay.stiffness(moving)
         rows += [("damping coefficient", *decay.damping(moving), si[1]), ("stiffness", *stiffness, si[2])]
-        if friction and np.isfinite(size):
+        if friction and isfinite(size):
             newton = stiffness[0] * size
             rows.append(("dry friction", newton * decay.friction, newton * decay.friction_error, si[3]))
     return rows

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import nan
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from linkwork.errors import LinkworkError
 
@@ -61,7 +60,7 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     first = [f"amplitude of {what} [{length}]"] if alone else ["number of the free coordinate [1]", "amplitude [SI]"]
     headings = [f"at [{unit}]", *first]
     headings += [f"{quantity} by {name} [%/%]" for quantity in ("place", "amplitude") for name in names]
-    return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
+    return [write_csv(path, dict(zip(headings, zip(*rows))))]
 
 
 def _response_points(response: Any) -> Iterator[tuple[str, Any]]:
@@ -72,7 +71,7 @@ def _response_points(response: Any) -> Iterator[tuple[str, Any]]:
 
 def _elasticities(gradient: Any) -> list[float]:
     """Return the elasticities; NaN for a quantity that is 0, such as the amplitude of a pendulum that hangs still."""
-    return list(gradient.elasticities.values()) if gradient.value else [np.nan] * len(gradient.names)
+    return list(gradient.elasticities.values()) if gradient.value else [nan] * len(gradient.names)
 
 
 def _movers_text(gradient: Any) -> str:

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import click
-import numpy as np
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import field_name
@@ -519,7 +518,7 @@ def _print_regions(found: Any) -> None:
 
     x, y = found.axes
     own = {traced.kind for traced in found.boundaries if traced.motion == TRUE_ORBIT}
-    count = int(np.ma.sum(found.grid.largest > 1.0 + TOLERANCE))
+    count = int((found.grid.largest > 1.0 + TOLERANCE).sum())
     sentences = [f"at {count} of {found.grid.largest.count()} points the motion that was found is unstable"]
     if Crossing.FOLD in own:
         sentences.append("where it crosses a fold it jumps to another motion, however stable both are")
