@@ -17,6 +17,7 @@ from math import pi, radians
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from ...display import format_count
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
@@ -349,15 +350,22 @@ def error_range(name: str, found: Linkage) -> tuple[float, float]:
     )
     n = len(found.vector)
 
-    def error(change: FloatArray) -> float:
+    def error(share: FloatArray) -> float:
+        change = off * share
         series = FourierSeries(
             motion.series.cos + change[n : n + 3], motion.series.sin + np.append(0.0, change[n + 3 : n + 5])
         )
         moved = SliderMotion(series, motion.guide_angle + change[-1])
         return linkage_error(name, replace(Linkage.from_vector(found.vector + change[:n], 1), pivot=moved))
 
-    corner = off * np.sign([error(step) - error(-step) for step in np.diag(off)])
-    return error(-corner), error(corner)
+    def least(sign: float) -> float:
+        """Return the least value of the error times ``sign``."""
+        unit = np.eye(len(off))
+        start = -sign * np.sign([error(step) - error(-step) for step in unit])
+        bounds = [(-1.0, 1.0)] * len(off)
+        return float(minimize(lambda share: sign * error(share), start, method="L-BFGS-B", bounds=bounds).fun)
+
+    return least(1.0), -least(-1.0)
 
 
 def moved_path() -> StudyResult:
