@@ -310,7 +310,13 @@ SAMPLES = 720
 
 
 def pin_functions(
-    d: Any, make: MachineSpec, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
+    d: Any,
+    make: MachineSpec,
+    crank_angle: Any,
+    *,
+    straight: bool = False,
+    linkage: type[Linkage] = Linkage,
+    on_slider: bool = False,
 ) -> dict[str, tuple[Any, Any]]:
     """Return the components of each pin's force along and across the ground link (N), by pin, for CasADi symbols or numbers.
 
@@ -325,6 +331,8 @@ def pin_functions(
         Whether the coupler point is on the line of B and C, see `link_mass_properties`.
     linkage : type
         Type of the linkage; for a slider-crank the force at D is that of the guide on the slider.
+    on_slider : bool
+        Whether the coupler point is the pin C of a slider-crank, whose slider then carries the load.
     """
     casadi = symbolic.library()
     kind, plant, law = _trace_plant()
@@ -340,7 +348,9 @@ def pin_functions(
     e3, e4 = plant.centripetal(g, w2, w3, w4, p)
     held = Motion(w3, w4, 0.0, 0.0, e3, e4, 0.0, 0.0, 0.0, 0.0, 0.0)
     f = plant.reactions(g, (crank_angle, 0.0, w2, 0.0, 0.0, 0.0), held, Inputs(1.0, 0.0, 0.0, 0.0, *load), p)
-    return {"A": (f.ax, f.ay), "B": (f.bx, f.by), "C": (f.cx, f.cy), "D": (f.dx, f.dy)}
+    # the plant's load is on the coupler; a load on the slider goes through the pin
+    through = load if on_slider else (0.0, 0.0)
+    return {"A": (f.ax, f.ay), "B": (f.bx, f.by), "C": (f.cx + through[0], f.cy + through[1]), "D": (f.dx, f.dy)}
 
 
 @cache
@@ -408,7 +418,8 @@ def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float
     at = np.linspace(*((0.0, 2.0 * pi) if rotation is None else rotation), SAMPLES + 1)
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
-    found = pin_functions(d, make, casadi.DM(linkage.crank_angle(at)), straight=straight, linkage=type(linkage))
+    th2, carries = casadi.DM(linkage.crank_angle(at)), linkage.point_is_pin
+    found = pin_functions(d, make, th2, straight=straight, linkage=type(linkage), on_slider=carries)
     force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])
     joined = np.isfinite(force).all(axis=1)
     if not joined.all():

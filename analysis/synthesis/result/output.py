@@ -591,6 +591,9 @@ def description(
     }
     if isinstance(linkage, SliderCrank):
         bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
+        if linkage.point_is_pin:
+            # the load acts on the block, not on the coupler
+            bodies["block"]["points"]["P"] = [0, 0]
         tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
     else:
         bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
@@ -638,8 +641,8 @@ def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
     """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
     if not any(make.load):
         return {}
-    # the coupler point may be one of the coupler's pins
-    point = "C" if linkage.point_is_pin else "P" if linkage.point_distance else "B"
+    # the coupler point may be the pin B
+    point = "P" if linkage.point_distance else "B"
     return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
 
 

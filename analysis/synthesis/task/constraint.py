@@ -257,12 +257,15 @@ class RotationRange(NamedTuple):
         Whether the bounds fix the coupler point on the line of B and C.
     linkage : type
         Type of the linkages.
+    of_slider : bool
+        Whether the coupler point is the pin of a slider-crank's slider.
     """
 
     turn: bool
     rotation: FloatArray | None
     straight: bool = False
     linkage: type[Linkage] = Linkage
+    of_slider: bool = False
 
     def ends(self, what: str) -> tuple[float, float]:
         """Return the ends of the range in which a constraint must hold (rad): a turn, or the range of the task's rotations.
@@ -440,7 +443,9 @@ class _Forces(Demand):
         def magnitudes(d: Any, rotation: Any) -> Any:
             casadi = symbolic.library()
             th2 = rotation if turn else rotation + d.crank_phase
-            found = pin_functions(d, self.make, th2, straight=way.straight, linkage=way.linkage)
+            found = pin_functions(
+                d, self.make, th2, straight=way.straight, linkage=way.linkage, on_slider=way.of_slider
+            )
             # the added number keeps the slope of a zero force finite
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))

@@ -234,7 +234,7 @@ def make_limits(
     if way is not None and normal.whole_turn and grashof not in _SWINGING:
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
-    over = RotationRange(turn is not None, normal.rotation, straight, linkage)
+    over = RotationRange(turn is not None, normal.rotation, straight, linkage, normal.of_slider)
     rests = linkage is SliderCrank or grashof == "crank-rocker"
     if over.turn and rests and any(isinstance(c, Demand) and c.excludes_rest for c in constraints):
         raise InfeasibleError(
