@@ -163,7 +163,8 @@ def write_solution(
     written += common.save_plot(plot, solution, folder / "best-linkage.png", title=title)
     if plot:
         forces = _forces(solution, make)
-        sheet = figures.plot_sheet(best, forces, title=title, made=make.describe(forces=forces is not None))
+        made = make.describe(forces=forces is not None, linkage=linkage)
+        sheet = figures.plot_sheet(best, forces, title=title, made=made)
         written.append(save_figure(sheet, folder / "best-sheet.pdf"))
     if animate:
         with common.console.status("animating"):

@@ -261,6 +261,14 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
     assert (toggle.position, other.position) == ("stretched", "folded")
 
 
+def test_the_sheet_says_where_the_load_acts() -> None:
+    make = syn.MachineSpec(load=("-20 N", "0 N"))
+    plain = syn.Linkage(ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2)
+    sliding = syn.SliderCrank(ground_length=0.0, crank_length=0.08, coupler_length=0.25, point_distance=0.25)
+    for linkage, place in ((plain, "at B"), (replace(plain, point_distance=0.1), "at P"), (sliding, "on the slider")):
+        assert make.describe(linkage=linkage).endswith(f"-20 and 0 N {place}")
+
+
 def test_a_case_that_runs_has_the_load(free: syn.Solution, tmp_path: Path) -> None:
     """In the frame of the ground link, as the plant has it; its pins carry what they are said to, but for its spring."""
     made = replace(MAKE, gravity=0.0)

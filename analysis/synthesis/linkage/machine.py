@@ -155,13 +155,19 @@ class MachineSpec:
         """Return the diameter of the pins' holes (m)."""
         return 0.4 * self.width if self.pin is None else self.pin
 
-    def describe(self, *, forces: bool = True) -> str:
-        """Return a line that describes the bars and, with ``forces``, speed, gravity and load."""
+    def describe(self, *, forces: bool = True, linkage: Linkage | None = None) -> str:
+        """Return a line that describes the bars and, with ``forces``, speed, gravity and load.
+
+        If the ``linkage`` is given, the line says on which of its points the load acts.
+        """
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
+        place = "at P"
+        if linkage is not None and (linkage.point_is_pin or linkage.point_distance == 0.0):
+            place = "on the slider" if linkage.point_is_pin else "at B"
         return f"{bars}; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²" + (
-            f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else ""
+            f", {self.load[0]:g} and {self.load[1]:g} N {place}" if any(self.load) else ""
         )
 
     def describe_masses(self) -> str:
