@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
-from math import degrees
+from math import degrees, isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -282,7 +282,7 @@ def monte_carlo(
     ------
     InputError
         If ``turn`` is not a `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length
-        not above zero, or a crank inertia below the least that its mass allows.
+        not above zero, or a crank inertia below the least that its mass allows; or if a variance is too large for a number.
     ParameterError
         If there is no such quantity, ``samples`` is not a whole number of at least 2, or ``seed`` is a negative
         number or not a whole one.
@@ -369,7 +369,16 @@ def _sample_angle(turn: ForceTurn, i: int, errors: FloatArray, quantities: tuple
     missed, dead = evaluate_samples(code, width(), np.array(instant(turn, i)), values, errors, least_lever, found)
     found = found[:, : found.shape[1] - missed - dead]
     across = with_pole and found.size > 0 and bool(found[-2].min() < 0.0 < found[-2].max())
-    return _Draws({name: _statistics(x) for name, x in zip(quantities, found)}, across, missed, dead)
+    statistics: dict[str, tuple[Any, ...]] = {}
+    for name, x in zip(quantities, found):
+        try:
+            statistics[name] = _statistics(x)
+        except OverflowError as error:
+            raise InputError(
+                f"{name} is {x.min():.3g} to {x.max():.3g} {QUANTITIES[name]} in the samples at {_angle(turn, i)}: its "
+                "variance is too large for a floating-point number; are all values in the right units?"
+            ) from error
+    return _Draws(statistics, across, missed, dead)
 
 
 def _compile(turn: ForceTurn, names: tuple[str, ...], quantities: tuple[str, ...]) -> MachineCode:
@@ -402,10 +411,15 @@ def _compile_problem(
 
 
 def _statistics(values: FloatArray) -> tuple[Any, ...]:
-    """Return the fields of `Spread` for the samples at one angle, NaN without samples."""
+    """Return the fields of `Spread` for the samples at one angle, NaN without samples; OverflowError if they are too large."""
     if values.size < 2:
         none = np.nan
         return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    # the kernels write outside their arrays if the range of the values is not finite
+    if not isfinite(deviation):
+        raise OverflowError
     places = np.array(PERCENTILES) / 100.0 * (values.size - 1)
     below = np.minimum(places.astype(int), values.size - 2)
     low, first, last, high, *around = order_statistics(
@@ -418,8 +432,8 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
     count_in_bins(values, first, end, counts)
     percentiles = lower + (places - below) * (upper - lower)
     return (
-        float(values.mean()),
-        float(values.std(ddof=1)),
+        mean,
+        deviation,
         percentiles,
         low,
         high,

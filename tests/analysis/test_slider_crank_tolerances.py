@@ -275,6 +275,14 @@ def test_order_statistics_are_those_of_the_sorted_values(values: list[float]) ->
     assert found.tolist() == sorted(values)[::3]
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the linear estimate
+@pytest.mark.parametrize("speed", [1e100, 1e160])
+def test_samples_with_a_variance_beyond_all_numbers_are_refused(speed: float) -> None:
+    turn = force_turn(OFFSET, crank_speed=speed, angles=[0.5])
+    with pytest.raises(InputError, match=r"slider.acceleration is .* m/s2"):
+        monte_carlo(turn, TOLERANCES, quantities=["slider.acceleration"], samples=50)
+
+
 @pytest.mark.parametrize("problem", [{"load": 40.0}, {"torque": CRANK_TORQUE}], ids=["load given", "torque given"])
 def test_samples_with_a_groove_are_mechanisms_changed(problem: dict[str, Any]) -> None:
     """The error of the crank's angle moves the shift, too, as the groove in the shaft makes it."""
