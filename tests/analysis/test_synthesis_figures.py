@@ -18,6 +18,7 @@ from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
 from analysis.files.drawings import Polyline
 from analysis.numerics.fourier import FourierSeries
+from analysis.synthesis.result import report
 from analysis.synthesis.result.output import rounded_hull
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
@@ -502,6 +503,13 @@ def test_the_least_mechanical_advantage_lies_between_targets_that_are_dead_centr
     for way in (1, -1):
         swing = syn.synthesize(syn.QuickSwing(swing=f"{60 * way} deg", time_ratio=1.1), constraints=[]).best
         assert f"rocker at rest at crank rotations of 0.00, {way * 360 * 1.1 / 2.1:.2f} deg" in syn.report(swing)
+
+
+@pytest.mark.parametrize(("direction", "other"), [(1.0, "57.30"), (-1.0, "-302.70")])
+@pytest.mark.parametrize("zero", [0.0, 1e-9, 2.0 * pi - 1e-9])
+def test_a_rotation_of_zero_is_not_printed_as_a_turn(direction: float, other: str, zero: float) -> None:
+    line = report._rotation_line("rocker at rest", (zero, 1.0), direction)
+    assert line == f"\nrocker at rest at crank rotations of 0.00, {other} deg"
 
 
 def test_a_crank_that_cannot_turn_on_has_no_advantage_in_its_toggle() -> None:

@@ -204,7 +204,7 @@ class TestFreeMotion:
         assert free_crank.Turns.from_run(run).slider == pytest.approx([100.0 * np.pi, 300.0 * np.pi], rel=1e-9)
 
     def test_too_few_turns_to_compare(self) -> None:
-        with pytest.raises(InputError, match="1 turns to compare"):
+        with pytest.raises(InputError, match="1 turn to compare"):
             runs.greatest_ratio(np.array([3.0]))
 
     def test_turns_end_where_the_crank_turns_back(self) -> None:

@@ -17,6 +17,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3_1
 
+from ...display import format_count
 from ...run import Inputs, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ALIKE
@@ -124,7 +125,9 @@ def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
 def greatest_ratio(values: NDArray[np.float64]) -> float:
     """Return the greatest ratio of a value to its predecessor; raise an InputError if there is only one, or none."""
     if len(values) < 2:
-        raise InputError(f"{len(values)} turns to compare: there must be at least 2; change the parameters less")
+        raise InputError(
+            f"{format_count(len(values), 'turn')} to compare: there must be at least 2; change the parameters less"
+        )
     return float((values[1:] / values[:-1]).max())
 
 

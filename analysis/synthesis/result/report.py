@@ -555,7 +555,8 @@ def _rotation_line(what: str, places: Sequence[float], direction: float) -> str:
     """
     if not places:
         return ""
-    within = sorted(degrees(direction * at % (2.0 * pi)) for at in places)
+    # rounded first: a rotation of 0 that came out just below it would be 360
+    within = sorted(round(degrees(direction * at), 2) % 360.0 for at in places)
     return f"\n{what} at crank rotations of {', '.join(f'{direction * at + 0.0:.2f}' for at in within)} deg"
 
 
