@@ -351,9 +351,7 @@ static double bounded_step(const Plant *a, double step, const double x[STATES], 
     for (int i = 0; i < STATES; i++)
         if (step * fabs(slope[i]) > reach[i] * a->scale[i]) step = reach[i] * a->scale[i] / fabs(slope[i]);
     for (int i = 0; i < STATES; i++) ahead[i] = x[i] + PROBE * step * slope[i];
-    double clearance = state_clearance(a, x), fall = clearance - state_clearance(a, ahead);
-    if (isnan(fall)) return PROBE * step; /* beyond the limit */
-    return fall > 0.5 * PROBE * clearance ? 0.5 * PROBE * step * clearance / fall : step;
+    return step_short_of_limit(step, state_clearance(a, x), state_clearance(a, ahead));
 }
 
 /* The longest part of a step h from x that stays clear of the limit of assembly: it is written to x. */

@@ -46,6 +46,14 @@ static inline double attempt_step(Slope *slope, const void *context, double t, c
     return step_error(z, result, h, k, scale, length, length);
 }
 
+/* The step, shortened so that the clearance to a limit, at its rate, falls by no more than half; `ahead` is the clearance that the slope
+   at the beginning of the step gives after the fraction PROBE of it. */
+static inline double step_short_of_limit(double step, double clearance, double ahead) {
+    double fall = clearance - ahead;
+    if (isnan(fall)) return PROBE * step; /* beyond the limit */
+    return fall > 0.5 * PROBE * clearance ? 0.5 * PROBE * step * clearance / fall : step;
+}
+
 /* Return the factor by which the step grows or shrinks after one of that error, relative to the tolerance. */
 static inline double step_factor(double error) {
     if (error == 0.0) return GREATEST_FACTOR;

@@ -15,6 +15,7 @@ from analysis.periodic import (
     PeriodicOrbit,
     Stability,
     find_orbit,
+    find_orbits,
     largest_multipliers,
     newton_orbit,
 )
@@ -33,6 +34,12 @@ GENERAL = replace(
     TABLE_3_1, crank_mass=0.3, crank_cog_distance=0.01, crank_cog_angle=0.4, coupler_cog_angle=0.2,
     rocker_cog_angle=-0.3, slider_guide_angle=0.15, slider_spring_free_position=0.004,
     slider_coulomb_friction=0.4, coupler_point_distance=0.06, coupler_point_angle=0.5, ground_inclination=0.3,
+)  # fmt: skip
+#: A level five-bar whose coupler and rocker have no mass, so that the slider remains at rest. It passes a change point, where
+#: the crank points away from D.
+LIGHT = replace(
+    TABLE_3_1, ground_length=0.2, crank_length=0.05, coupler_length=0.19, rocker_length=0.06, slider_mass=1.0,
+    coupler_mass=0.0, coupler_inertia=0.0, rocker_mass=0.0, rocker_inertia=0.0,
 )  # fmt: skip
 #: Friction by contact forces in the place of that of a given level.
 ROUGH = replace(
@@ -193,6 +200,18 @@ def test_where_none_is_found_the_error_says_where_it_ended() -> None:
         find_orbit(replace(RIG_1_B, slider_damping=2.0), speed=1076.7 * RAD_S_PER_RPM, settle=False)
     assert len(caught.value.start) == 2
     assert caught.value.iterations > 0
+
+
+def test_no_periodic_motion_passes_over_a_change_point() -> None:
+    speed = 40.0
+    with pytest.raises(OrbitAssemblyError, match="limit of assembly"):
+        newton_orbit(LIGHT, Drive(speed=speed))
+    assert not find_orbits(LIGHT, speed=speed).orbits
+    assert "limit of assembly" in simulate(LIGHT, Inputs(speed=speed), stop_time=7.0 / speed).message
+    # without a change point the slider remains at rest
+    orbit = newton_orbit(replace(LIGHT, rocker_length=0.061), Drive(speed=speed))
+    assert orbit.amplitude == 0.0
+    assert orbit.clearance() > 0.05
 
 
 def test_limit_of_assembly_is_an_error_of_its_own() -> None:

@@ -15,7 +15,9 @@ from analysis.periodic import Drive, frequency_response, natural_frequency, newt
 from analysis.run import Case, InductionMotor, Inputs, load_case, read_case, simulate
 from analysis.studio import page_case, page_state
 from benchmarks.studio import figures_in_words, measure_page
+from linkwork.five_bar.parameters import InitialState
 from tests.analysis.test_linkages import coupled
+from tests.analysis.test_orbits import LIGHT
 from tests.analysis.test_several_freedoms import SHAKER
 from tests.analysis.test_studio import _HELD, OWN, _load, _near, _saved, _varied, in_browser
 from tests.analysis.test_swinging_links import yoke
@@ -248,6 +250,19 @@ def test_every_square_of_the_stability_chart_has_the_verdict_of_its_motion(page:
     canvas.click(position={"x": x, "y": 10 + (box["height"] - 50) * (1.0 - (row + 0.5) / 32)})
     page.wait_for_function("document.querySelector('#floquet b').textContent === 'unstable'")
     assert page.evaluate("window.studio.state.values['slider.damping']") == pytest.approx(5.0 + 10.0 * (row + 0.5) / 32)
+
+
+@in_browser
+def test_no_motion_passes_over_a_change_point(page: Any) -> None:
+    # the slider is at rest where the change point is at no simple fraction of a turn
+    u, inputs, limit = 0.03, Drive(speed=40.0).inputs(find_mechanism(LIGHT)), 0.05 + np.hypot(0.2, 0.03) - 0.19
+    aside = replace(LIGHT, gravity=0.0, slider_guide_angle=np.pi / 2.0, slider_spring_free_position=u)
+    for rocker, found in ((limit, False), (limit + 2e-4, True)):
+        parameters, start = replace(aside, rocker_length=rocker), InitialState(slider_position=u, crank_speed=40.0)
+        case = Case(title="", parameters=parameters, inputs=inputs, initial=start, stop_time=0.1)
+        orbit = _load(page, page_state(case))["answer"]["orbit"]
+        assert orbit["found"] == found
+        assert ("limit of assembly" in orbit["sentence"]) != found
 
 
 @in_browser

@@ -19,6 +19,7 @@ from analysis.periodic.motion.kernels import SECTION, Status
 from analysis.periodic.motion.tracks import DONE, IDLE, RUNNING, advance_tracks, begin, make_tracks, set_mechanism
 from analysis.run.compiled import read_lane
 from linkwork.five_bar.published import SETS
+from tests.analysis.test_orbits import LIGHT
 
 RIG = SETS["rig-2-spring-c"].parameters
 USED = PLAIN, VARIATIONAL, IN_LANES + PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
@@ -79,6 +80,17 @@ def test_lanes_take_the_steps_of_one_motion_alone(drive: Drive, columns: int) ->
         if status == Status.DONE:
             assert row == pytest.approx(alone[0], rel=1e-10, abs=1e-11 * np.abs(alone).max())
     assert len(set(statuses.tolist())) > 1
+
+
+def test_lanes_pass_over_no_change_point() -> None:
+    point = operating_point(LIGHT, Drive(speed=40.0))
+    section = point.section(np.zeros(2), *USED)
+    ends, rows, statuses = np.array([0.9, 1.1]) * pi, np.zeros((1, 2)), np.zeros(1, dtype=np.int64)
+    for end, wanted in zip(ends, (Status.DONE, Status.LIMIT)):
+        for tolerance in (1e-12, 1e-6):
+            constants, start = section.p[None, :].copy(), np.zeros((1, 2))
+            follow_all(section, 0, end, constants, np.array([tolerance]), start, rows, statuses)
+            assert statuses[0] == wanted
 
 
 @kernel(int64(SECTION, MATRIX, VECTOR, VECTOR, VECTOR), purpose="a test")

@@ -134,17 +134,37 @@ static bool slope(const void *context, double angle, const double z[], double re
     return true;
 }
 
-/* Take z from one angle to another; `proposal` is the step to begin with, and then that to go on with. */
-static bool across(double from, double to, double z[], const double scale[], int length, double tolerance, double *proposal) {
+/* The clearance to the limit of assembly. */
+static double clearance(double angle, const double y[]) {
+    double x[STATES], result;
+    locate(angle, y, x);
+    equations_clearance((const double *[]){x, plant.modes, section.u, plant.p}, (double *[]){&result}, NULL, NULL, 0);
+    return result;
+}
+
+/* The step, shortened so that no freedom, at its rate, moves by more than its reach, and the clearance falls by no more than half;
+   `rates` are those of z. */
+static double bounded_step(double step, double angle, const double z[], const double rates[], const double scale[]) {
+    double ahead[MOST];
+    step = fmin(step, reach[CRANK < 0 ? 0 : CRANK]);
+    for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
+        if (step * fabs(rates[i]) > reach[section.place[i]] * scale[i])
+            step = reach[section.place[i]] * scale[i] / fabs(rates[i]);
+    for (int i = 0; i < section.size; i++) ahead[i] = z[i] + PROBE * step * rates[i];
+    return step_short_of_limit(step, clearance(angle, z), clearance(angle + PROBE * step, ahead));
+}
+
+/* Take z from one angle, which becomes the angle reached, to another; `proposal` is the step to begin with, and then that to go on
+   with. */
+static bool across(double *from, double to, double z[], const double scale[], int length, double tolerance, double *proposal) {
     static double k[STAGES * LENGTH];
-    double result[LENGTH], done = 0.0, whole = to - from;
+    double result[LENGTH], begin = *from, done = 0.0, whole = to - begin;
     for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
-        double h = fmin(fmin(*proposal, reach[CRANK < 0 ? 0 : CRANK]), whole - done);
-        if (!slope(NULL, from + done, z, k, length)) return false;
-        for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
-            if (h * fabs(k[i]) > reach[section.place[i]] * scale[i]) h = reach[section.place[i]] * scale[i] / fabs(k[i]);
-        bool last = h >= whole - done;
-        double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;
+        if (!slope(NULL, *from, z, k, length)) return false;
+        *proposal = bounded_step(*proposal, *from, z, k, scale); /* the step after a shortened one grows from it */
+        bool last = *proposal >= whole - done;
+        double h = fmin(*proposal, whole - done);
+        double error = attempt_step(slope, NULL, *from, z, h, k, scale, length, result) / tolerance;
         *proposal = fmax(error <= 1.0 && h < *proposal ? *proposal : 0.0, h * step_factor(error));
         bool least = *proposal < LEAST_STEP * whole;
         /* at a kink of a force law, as at a stop, the rates of the columns jump: the least step is taken if y is accurate */
@@ -152,6 +172,8 @@ static bool across(double from, double to, double z[], const double scale[], int
             (least && error < KINK && step_error(z, result, h, k, scale, length, section.size + 1) <= tolerance)) {
             memcpy(z, result, (size_t)length * sizeof *z);
             done = last ? whole : done + h;
+            *from = last ? to : begin + done;
+            if (!(clearance(*from, z) >= LIMIT_CLEARANCE)) return false;
         } else if (least) {
             return false;
         }
@@ -173,20 +195,19 @@ static void motion_scales(double scale[LENGTH]) {
    asked for. */
 static bool once_round(double y[], int columns, double tolerance, double *proposal) {
     int n = section.size, length = n + 1 + columns * n, quarters = 16;
-    double z[LENGTH] = {0}, scale[LENGTH], x[STATES];
+    double z[LENGTH] = {0}, scale[LENGTH], x[STATES], angle = 0.0;
     motion_scales(scale);
     memcpy(z, y, (size_t)n * sizeof *z);
     for (int i = 0; i < n && i < columns; i++) z[n + 1 + i * n + i] = 1.0;
     for (int part = 0; part < quarters; part++) {
-        double to = PERIOD * (part + 1) / quarters;
-        bool good = across(PERIOD * part / quarters, to, z, scale, length, tolerance, proposal);
-        locate(good ? to : PERIOD * part / quarters, z, x);
+        bool good = across(&angle, PERIOD * (part + 1) / quarters, z, scale, length, tolerance, proposal);
+        locate(angle, z, x);
         reason = plant_check_assembly(&plant, x, sentence);
         if (reason == GOOD && !good) {
             Digits degrees;
             reason = TOLERANCE_NOT_MET;
             snprintf(sentence, SENTENCE, "a turn cannot be followed beyond crank angle %s deg",
-                     digits(degrees, 360.0 * part / quarters));
+                     digits(degrees, 90.0 * angle / QUARTER));
         }
         if (reason != GOOD) return false;
     }
@@ -388,19 +409,19 @@ int FACE(studio_orbit)(int warm) {
 /* Rows of the periodic motion that was found, at so many equal steps of the crank's angle and at the end. How many there are. */
 int FACE(studio_turn)(int steps) {
     int n = section.size, length = n + 1;
-    double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
+    double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0, angle = 0.0;
     Plant shown = plant;
     if (steps >= MOST_ROWS) steps = MOST_ROWS - 1;
     motion_scales(scale);
     memcpy(z, found.y, (size_t)n * sizeof *z);
     for (int number = 0;; number++) {
-        locate(PERIOD * number / steps, z, shown.x);
+        locate(angle, z, shown.x);
         shown.time = z[n];
         reason = plant_check_assembly(&shown, shown.x, sentence);
         if (reason == GOOD) reason = write_row(&shown, number);
         if (reason != GOOD) return number;
         if (number == steps) return number + 1;
-        if (!across(PERIOD * number / steps, PERIOD * (number + 1) / steps, z, scale, length, FINE, &proposal)) {
+        if (!across(&angle, PERIOD * (number + 1) / steps, z, scale, length, FINE, &proposal)) {
             reason = TOLERANCE_NOT_MET;
             return number + 1;
         }
@@ -589,14 +610,13 @@ int FACE(studio_follow)(void) {
    rounding. */
 void FACE(studio_amplitudes)(void) {
     static double samples[MOST][SAMPLES];
-    double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
+    double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0, angle = 0.0;
     bool good = true;
     motion_scales(scale);
     memcpy(z, found.y, (size_t)section.size * sizeof *z);
     for (int n = 0; n < SAMPLES && good; n++) {
-        double from = PERIOD * n / SAMPLES, to = PERIOD * (n + 1) / SAMPLES;
         for (int i = 0; i < found.count; i++) samples[i][n] = z[i] - section.growth[i] * n / SAMPLES;
-        good = across(from, to, z, scale, section.size + 1, FINE, &proposal);
+        good = across(&angle, PERIOD * (n + 1) / SAMPLES, z, scale, section.size + 1, FINE, &proposal);
     }
     for (int i = 0; i < found.count; i++) {
         double size = swing_amplitude(samples[i]);

@@ -359,10 +359,10 @@ def row_name(row: PointRow, guesses: FloatArray, functions: Sequence[int], code:
     ``guesses`` are guesses of y, shape (k, n); ``functions`` the indices of the flow's functions that are called; ``code`` is
     that of `row_code`; ``numbers`` are further numbers that the row depends on.
     """
-    flow = row.flow
+    flow, bound = row.flow, row.flow.mechanism.greatest_rotation
     digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=row.switched), *code)).encode())
     digest.update(np.hstack([row.constants, row.vectors, row.scales]).tobytes())
-    digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, *numbers]).tobytes())
+    digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, bound, *numbers]).tobytes())
     return digest.hexdigest()[:32]
 
 

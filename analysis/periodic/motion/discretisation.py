@@ -155,6 +155,7 @@ class OperatingPoint:
             tolerance,
             self.flow.torque,
             self.flow.longest_step(self.vector),
+            np.full(len(self.flow.free), self.mechanism.greatest_rotation),
         )
 
     def shoot(

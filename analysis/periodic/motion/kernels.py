@@ -20,6 +20,7 @@ import numpy as np
 from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
+from linkwork.integrate import PROBE
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
@@ -31,12 +32,14 @@ from ...run.stepping import (
     STAGES,
     Flow,
     attempt,
+    bounded_step_size,
     interpolant,
     interpolate,
     leading_error,
     next_step_size,
     shorter_step_size,
     stage,
+    step_short_of_limit,
 )
 from .flow import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
@@ -84,10 +87,11 @@ class Section(NamedTuple):
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
     longest: float  # greatest step (rad)
+    reach: NDArray[np.float64]  # greatest change of each free coordinate in a step, relative to its scale
 
 
 SECTION = types.NamedTuple(
-    (int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean, float64), Section
+    (int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean, float64, VECTOR), Section
 )
 
 
@@ -96,7 +100,7 @@ def replace_numbers(section, drive, p, scale, tolerance):
     """Return the section with new drive vector, constants p, scale and tolerance, and with 1 for the magnitude of lambda."""
     return Section(
         section.equations, section.modes, drive, p, scale, section.angle_periods, 1.0, tolerance, section.torque,
-        section.longest,
+        section.longest, section.reach,
     )  # fmt: skip
 
 
@@ -115,6 +119,7 @@ class Room(NamedTuple):
     y: NDArray[np.float64]  # z after a step
     sizes: NDArray[np.float64]  # magnitudes of z
     gap: NDArray[np.float64]  # clearance to the limit of assembly, shape (1,)
+    ahead: NDArray[np.float64]  # y after a small part of a step, shape (n,)
 
 
 @part
@@ -126,7 +131,7 @@ def make_room(section, columns):
         sizes[i] = section.scale[i]
         for j in range(columns):
             sizes[n + j * n + i] = section.scale[i] / (section.scale[j] if j < n else section.along)
-    return Room(np.zeros((16, sizes.shape[0])), np.empty(sizes.shape[0]), sizes, np.empty(1))
+    return Room(np.zeros((16, sizes.shape[0])), np.empty(sizes.shape[0]), sizes, np.empty(1), np.empty(n))
 
 
 @inner
@@ -155,20 +160,34 @@ def most_steps(way):
 
 
 @inner
+def _bounded_size(section, size, angle, z, room):
+    """Return a step size, shortened so that the step passes over no force and no limit of assembly.
+
+    ``room.gap`` has the clearance at z, and ``room.k[0]`` the rates of z.
+    """
+    size = bounded_step_size(min(size, section.longest), room.k[0], section.reach, section.scale, 0, 1)
+    clearance = room.gap[0]
+    for i in range(section.scale.shape[0]):
+        room.ahead[i] = z[i] + PROBE * size * room.k[0, i]
+    return step_short_of_limit(size, clearance, _clearance(section, angle + PROBE * size, room.ahead, room))
+
+
+@inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
     """Take one step from z, shortened until its error is accepted; return the status and the new crank angle.
 
-    The step ends at ``end`` at the latest. The rates of z are in ``room.k[0]``; z after the step is written into ``room.y``.
-    ``slowest`` is the crank speed below which the crank stalls; ``carry`` is that of `advance`.
+    The step ends at ``end`` at the latest. The rates of z are in ``room.k[0]``, and its clearance in ``room.gap``. z after the
+    step and its clearance are written into ``room.y`` and ``room.gap``. ``slowest`` is the crank speed below which the crank
+    stalls; ``carry`` is that of `advance`.
     """
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
-    proposed = carry[0]
+    # the step after a shortened one grows from it
+    proposed = _bounded_size(section, carry[0], angle, z, room)
     while True:
         # avoid a tiny last step before the end
-        size = min(proposed, section.longest)
-        last = angle + 1.001 * size >= end
-        h = end - angle if last else size
+        last = angle + 1.001 * proposed >= end
+        h = end - angle if last else proposed
         error = attempt(flow, 0.0, angle, h, z, room, section.drive, -1, None) / section.tolerance
         carry[1] += 1.0
         if error <= 1.0:

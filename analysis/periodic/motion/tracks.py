@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.integrate import PROBE
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import evaluate, inner, part
 from ...numerics.vectors import LANES, load, multiply_add, store
 from ...run.compiled import write_lane
-from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
+from ...run.stepping import NODES, STAGES, bounded_step_size, next_step_size, shorter_step_size, step_short_of_limit
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import (
@@ -60,8 +61,8 @@ class Tracks(NamedTuple):
     tolerance: NDArray[np.float64]  # bound of the error
     count: NDArray[np.float64]  # steps since the beginning of the motion
     slowest: NDArray[np.float64]  # crank speed below which the crank counts as stalled (rad/s)
-    gap: NDArray[np.float64]  # clearance to the limit of assembly at the end of a step
-    before: NDArray[np.float64]  # the same at its beginning
+    gap: NDArray[np.float64]  # clearance to the limit of assembly after a small part of a step, then at its end
+    before: NDArray[np.float64]  # the same at the beginning of the step
     status: NDArray[np.int64]
     z: NDArray[np.float64]  # z of one lane
 
@@ -139,16 +140,43 @@ def _rates(section, s, z, v):
 
 
 @inner
-def _attempt(section, v):
-    """Try a step in all lanes; write z after the step into ``v.y``, error and clearance into ``v.error`` and ``v.gap``."""
+def _evaluate_gap(section, node, v):
+    """Write into ``v.gap`` the clearance at z in ``v.y``, at a fraction ``node`` of the step."""
+    _set_argument(node, section.scale.shape[0], v.y, v)
+    evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, v.modes, v.drive, v.p, v.gap)
+
+
+@inner
+def _choose_sizes(section, v):
+    """Compute the rates in all lanes, and choose the step of each lane, which passes over no force and no limit of assembly."""
+    n = section.scale.shape[0]
     _rates(section, 0, v.x, v)
+    for lane in range(LANES):
+        v.h[lane] = 0.0
+        if v.status[lane] == RUNNING:
+            size = min(v.step[lane], section.longest)
+            v.h[lane] = bounded_step_size(size, v.k[0], section.reach, v.sizes, lane, LANES)
+    for i in range(n):
+        store(v.y, i, multiply_add(PROBE, load(v.h, 0) * load(v.k[0], i), load(v.x, i)))
+    _evaluate_gap(section, PROBE, v)
+    for lane in range(LANES):
+        if v.status[lane] == RUNNING:
+            # the step after a shortened one grows from it
+            v.step[lane] = step_short_of_limit(v.h[lane], v.before[lane], v.gap[lane])
+            # avoid a tiny last step before the end
+            rest = v.end[lane] - v.angle[lane]
+            v.h[lane] = rest if 1.001 * v.step[lane] >= rest else v.step[lane]
+
+
+@inner
+def _attempt(section, v):
+    """Try a step in all lanes from the rates in ``v.k[0]``; write z after it, its error and clearance into v."""
     for s in range(1, STAGES):
         stage_in_lanes(s, v.x, v.k, v.h, v.y)
         _rates(section, s, v.y, v)
     stage_in_lanes(STAGES, v.x, v.k, v.h, v.y)
     errors_in_lanes(v.x, v.y, v.k, v.h, v.sizes, v.error)
-    _set_argument(1.0, section.scale.shape[0], v.y, v)
-    evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, v.modes, v.drive, v.p, v.gap)
+    _evaluate_gap(section, 1.0, v)
 
 
 @inner
@@ -195,14 +223,10 @@ def advance_tracks(section, v):
     while not ended:
         running = False
         for lane in range(LANES):
-            v.h[lane] = 0.0
-            if v.status[lane] == RUNNING:
-                running = True
-                # avoid a tiny last step before the end
-                rest, size = v.end[lane] - v.angle[lane], min(v.step[lane], section.longest)
-                v.h[lane] = rest if 1.001 * size >= rest else size
+            running |= v.status[lane] == RUNNING
         if not running:
             return False
+        _choose_sizes(section, v)
         _attempt(section, v)
         for lane in range(LANES):
             if v.status[lane] == RUNNING:
