@@ -17,6 +17,7 @@ from analysis.periodic import Crossing, mean_effective_mass, natural_frequency
 from analysis.studies.youssef import chapter_8, instruments, rig_1, rig_2, rigs
 from analysis.studies.youssef.runs import steady_turn
 from analysis.units import RAD_S_PER_RPM
+from analysis.youssef import Variant
 from linkwork.five_bar.published import SETS
 from tests import published
 
@@ -276,6 +277,13 @@ class TestRig2:
         for speed in (200.0, 400.0, 700.0, 1000.0):
             full = rigs.harmonic(rigs.turn(spring, speed), 2) / rig_2.length(spring)
             assert rig_2.linear_motion(spring, speed).harmonic(2) == pytest.approx(full, rel=0.1)
+
+    @pytest.mark.parametrize(("spring", "rise"), [("C", 1.72e-4), ("D", 4.69e-4)])
+    def test_what_the_orders_of_xi_alone_add(self, spring: str, rise: float) -> None:
+        """At 1000 rpm; from a separate integration and balance. With two harmonics it would be 5e-4 more."""
+        linear = rig_2.linear_motion(spring, 1000.0, Variant.EXACT, rig_2.EXACT_HARMONICS).amplitude
+        full = rigs.amplitude(rigs.turn(spring, 1000.0)) / rig_2.length(spring)
+        assert full / linear - 1.0 == pytest.approx(rise, abs=3e-6)
 
     def test_place_of_the_greatest_second_harmonic(self) -> None:
         """To first order of sigma2 it is the natural frequency, to second order half of it."""
