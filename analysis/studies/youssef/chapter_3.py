@@ -191,7 +191,7 @@ def _shape_statements() -> list[Statement]:
             text("3.2.1, L1972-1976"),
             "width, read as the crank angle from the least to the greatest u, relative to the width with the next softer "
             "spring. Then the range of the spring's force over the turn (our choice), divided by the greater of two ranges: "
-            "that of the damper's force and that of the mean effective mass times the acceleration",
+            "that of the damper's force and that of the mean effective mass at u = 0 times the acceleration",
             f"{SIGN}; at least 1, as *dominant* says",
             (
                 at_most("width, greatest", 1.0, greatest_ratio(widths)),

@@ -475,10 +475,11 @@ def launch_positions_by_spring() -> StudyResult:
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
             "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and "
-            "in the last turn within 1 s, the latter to one digit. The steady decay is u of a free crank at equal crank angle "
-            "and mean speed of the turn (or in its fastest turn), released from its steady motion at "
-            f"{', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our choice). Then the mean of u "
-            f"relative to the turn before, once u is within {ALIKE:g} of that decay",
+            "in the last turn within 1 s, the latter to one digit. The steady decay is u of a free crank that is released from "
+            f"its steady motion at {', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our "
+            "choice). The two are compared at equal crank angles, in turns of equal mean speed; where the launched crank is "
+            "faster, with the fastest turn of the released one. Then the mean of u relative to the turn before, once u is "
+            f"within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
