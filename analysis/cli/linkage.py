@@ -89,10 +89,11 @@ def _print_reach(made: Mechanism) -> None:
         ends = [
             f"{'beyond ' if free else ''}{factor * end:.4g}" for end, free in zip((found.low, found.high), found.open)
         ]
-        span = "turns" if found.turns else f"{' to '.join(ends)} {unit}"
+        span = "full turns" if found.turns else f"{' to '.join(ends)} {unit}"
         rows.append((freedom.coordinate, span, f"{degrees(asin(min(1.0, found.least))):.3g}"))
     columns = ("freedom", "range of motion", "least transmission angle [deg]")
-    show_table("range of motion, the other freedoms at their start", columns, rows)
+    others = ", the other freedoms at their start" if len(rows) > 1 else ""
+    show_table(f"range of motion{others}", columns, rows)
 
 
 def _print_dead_centres(package: Package) -> None:

@@ -149,7 +149,7 @@ def run(
         common.note(note)
     if found.powers:
         advice = found.suggested_step(1e-3)
-        then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
+        then = f"; for 0.1 %, take steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
         common.say(
             f"work that the coupling added: {100.0 * found.added_work():.2g} % of the work through the power bonds{then}"
         )

@@ -128,7 +128,7 @@ def _default(value: Any, read: Reader) -> Any:
         return None if None in ends else ends
     if isinstance(value, tuple) and value and all(isinstance(item, (int, float, str)) for item in value):
         return list(value)
-    return value if isinstance(value, (bool, int, str)) else None
+    return value if isinstance(value, (bool, int, str)) or (isinstance(value, float) and isfinite(value)) else None
 
 
 def entries(

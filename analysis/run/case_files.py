@@ -158,7 +158,13 @@ def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
 
 
 def _tolerance(value: Any, name: str) -> float:
-    """Return a tolerance of the solver; raise ParameterError with its name in the file if it is outside of its range."""
+    """Return a tolerance of the solver.
+
+    Raises
+    ------
+    ParameterError
+        With the tolerance's name in the file, if it is outside of its range.
+    """
     number = quantity(value, "1", name)
     low, high = TOLERANCE_RANGE
     if not low <= number <= high:
@@ -168,7 +174,19 @@ def _tolerance(value: Any, name: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
-    """The table ``[run]``: duration, step and tolerance of a run."""
+    """The table ``[run]``: duration, step and tolerance of a run.
+
+    Attributes
+    ----------
+    stop_time : float, optional
+        Duration of the run. By default three revolutions of the slowest crank.
+    revolutions : float, optional
+        Duration in revolutions of the slowest crank, if its speed is constant. Not with stop_time.
+    step : float, optional
+        Time between two samples. By default that of 1 deg of the fastest crank, or 1 ms.
+    tolerance : float
+        Tolerance of the solver, between 1e-13 and 0.01.
+    """
 
     stop_time: float | None = entry(Quantity("s"), None)
     revolutions: float | None = entry(Quantity("1", above=0.0), None)

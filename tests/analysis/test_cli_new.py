@@ -75,6 +75,15 @@ def test_it_holds_every_entry_there_is(kind):
         assert names(found[table]) == set(entry_names(tables[table])), table
 
 
+@pytest.mark.parametrize("kind", MECHANISMS)
+def test_the_entries_of_a_run_have_defaults_and_explanations_for_its_reader(kind):
+    lines = sections(case_text(kind, "x.toml"))["run"][1:]
+    assert any(line.startswith("# tolerance = 1e-09 ") for line in lines)
+    explained = [line.partition("  # ")[2] for line in lines]
+    assert all(explained)
+    assert not any("Error" in words or words.startswith("Return") for words in explained)
+
+
 @pytest.mark.parametrize("kind", [kind for kind in kinds() if kind != LINKAGE])
 def test_examples_behind_a_number_sign_are_taken(kind, tmp_path):
     text = case_text(kind, "x.toml")

@@ -159,7 +159,7 @@ class Constraints:
     max_pin_force : float
         Greatest force on any pin, at the speed and under the load of ``make``.
     least_pin_force_within : float
-        Greatest error with which the greatest pin force is minimised instead of the error.
+        Minimise the greatest pin force, among linkages whose greatest error is no larger than this.
     pins : str
         Letters of the pins whose forces count.
     require : list
