@@ -474,9 +474,9 @@ def launch_positions_by_spring() -> StudyResult:
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
-            "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and "
-            "in the last turn within 1 s, the latter to one digit. The steady decay is u of a free crank that is released from "
-            f"its steady motion at {', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our "
+            "distance of u from its steady decay, relative to the range of this decay in the turn, in the first turn after the "
+            "torque and in the last turn within 1 s, the latter to one digit. The decay is u of a free crank that is released "
+            f"from its steady motion at {', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our "
             "choice). The two are compared at equal crank angles, in turns of equal mean speed; where the launched crank is "
             "faster, with the fastest turn of the released one. Then the mean of u relative to the turn before, once u is "
             f"within {ALIKE:g} of that decay",
