@@ -107,6 +107,7 @@ def resonance(
     from .. import figures
     from ..files import write_csv
     from ..periodic import (
+        NothingFreeError,
         ResponseInterrupted,
         default_variable,
         frequency_response,
@@ -129,6 +130,8 @@ def resonance(
     natural, modes = None, _find_modes(chosen.case, over_speed)
     with suppress(LinkworkError):  # the mechanism may have no spring
         natural = natural_frequency(parameters)
+    if isinstance(modes, NothingFreeError):
+        chosen.drive("1 rad/s" if over_speed else None)  # its error says what to do; a range would not help
     ends = _range_ends(parameters, vary, low, high, natural, modes)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
     start = chosen.start(drive)

@@ -289,7 +289,7 @@ def _run_compiler(folder: Path | str, files: Sequence[str], library: str, target
             shutil.rmtree(cache)
             cache.mkdir(mode=0o700)
         if not known.is_file():
-            sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
+            sys.stderr.write(f"linkwork: Zig compiles its own libraries for {target}, once on this machine ...\n")
         done = subprocess.run(
             [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files],
             cwd=folder,

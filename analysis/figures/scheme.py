@@ -152,7 +152,8 @@ def draw_at_start(parameters: Any, axis: Axes, run: Trajectory) -> str:
     draw(axis, mechanism, parameters, at)
     drawing = mechanism.drawing
     assert drawing is not None
-    return f"{mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
+    noun = "path" if len(drawing.paths) == 1 else "paths"
+    return f"{mechanism.title} at the start; {noun} of {', '.join(drawing.paths)} {words}"
 
 
 def _swept_positions(mechanism: Mechanism, found: Reach) -> dict[str, Array]:
