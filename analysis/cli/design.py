@@ -146,7 +146,7 @@ def write_solution(
     from .. import figures
     from ..files import save_figure, write_tables
     from ..run import save_parameters
-    from ..synthesis import plates, run_case
+    from ..synthesis import neglected_load, plates, run_case
 
     written = write_description_files(best, folder, title, curve="best-curve", text="best-report", drawn="best")
     solution = best.solution
@@ -157,7 +157,11 @@ def write_solution(
         )
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
-        written.append(write_tables(case, run_case(solution, make, title), head=make.describe_masses()))
+        head = make.describe_masses()
+        if left_out := neglected_load(linkage, make):
+            common.note(left_out)
+            head += f"; {left_out}"
+        written.append(write_tables(case, run_case(solution, make, title), head=head))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += _save_drawing(cut, folder / "best-plates")
     written += common.save_plot(plot, solution, folder / "best-linkage.png", title=title)

@@ -36,6 +36,7 @@ from .result.output import LinkageScene as LinkageScene
 from .result.output import crowded_plates as crowded_plates
 from .result.output import described_case as described_case
 from .result.output import drawing as drawing
+from .result.output import neglected_load as neglected_load
 from .result.output import plates as plates
 from .result.output import run_case as run_case
 from .result.report import Assessment as Assessment

@@ -4,7 +4,7 @@ import json
 import re
 import tomllib
 from dataclasses import replace
-from math import cos, degrees, pi, radians, sin
+from math import asin, cos, degrees, pi, radians, sin
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -170,7 +170,14 @@ def test_a_slider_that_does_not_settle_starts_at_its_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("point", "given"), [((0.1, 0.5), {}), ((0.1, 0.5), {"coupler_mass": 0.6}), ((0.3, 0.0), {"load": (0.0, 0.0)})]
+    ("point", "given"),
+    [
+        ((0.1, 0.5), {}),
+        ((0.1, 0.5), {"coupler_mass": 0.6}),
+        ((0.3, 0.0), {"load": (0.0, 0.0)}),
+        ((0.25, 0.0), {}),
+        ((0.0, 0.0), {}),
+    ],
 )
 def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, given) -> None:
     linkage = syn.Linkage(
@@ -187,8 +194,9 @@ def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, 
     # of the other file a stiff spring holds the rocker's pivot, which starts in its steady motion
     torques = [run["drive.applied_torque"] for run in runs]
     np.testing.assert_allclose(*torques, atol=2e-3 * np.abs(torques[0]).max())
-    forces = [np.hypot(run[f"{pin}.fx"], run[f"{pin}.fy"]) for run, pin in zip(runs, ("A", "pin.A"))]
-    np.testing.assert_allclose(*forces, atol=1e-2 * forces[0].max())
+    for pin in "ABCD":
+        forces = [np.hypot(run[f"{name}.fx"], run[f"{name}.fy"]) for run, name in zip(runs, (pin, f"pin.{pin}"))]
+        np.testing.assert_allclose(*forces, atol=1e-2 * forces[0].max())
 
 
 def test_both_files_of_a_slider_crank_have_the_same_spring_damper_and_friction(tmp_path) -> None:
@@ -197,12 +205,46 @@ def test_both_files_of_a_slider_crank_have_the_same_spring_damper_and_friction(t
     spring = {"slider_stiffness": 900.0, "slider_spring_free_position": 0.15}
     make = syn.MachineSpec(speed=15.0, slider_damping=40.0, slider_coulomb_friction=3.0, **spring)
     solution = syn.Solution.from_linkage(task, crank)
-    torques = []
-    for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other")):
-        ran = read_case(tables, folder=tmp_path)
-        run = simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.4, step=0.02)
-        torques.append(run["drive.applied_torque"])
-    np.testing.assert_allclose(*torques, atol=1e-6 * np.abs(torques[0]).max())
+    described, hand = (
+        _run(tables, tmp_path, 0.4)
+        for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other"))
+    )
+    torque = described["drive.applied_torque"]
+    np.testing.assert_allclose(hand["drive.applied_torque"], torque, atol=1e-6 * np.abs(torque).max())
+
+
+def test_a_load_on_the_slider_goes_through_its_pin(tmp_path) -> None:
+    """At rest, with light bars on a level guide without an offset, the coupler alone holds the slider against the load."""
+    crank = syn.SliderCrank(
+        ground_length=0.0, crank_length=0.05, coupler_length=0.2, point_distance=0.2, ground_angle=0.5 * pi
+    )
+    task = syn.SliderFunction(position=[-0.2, -0.15, -0.2], rotation=[0.0, 1.0, 2.0])
+    make = syn.MachineSpec(speed=1e-6, density=1e-6, slider_mass=1.0, gravity=0.0, load=(-60.0, 0.0))
+    solution = syn.Solution.from_linkage(task, crank)
+    described, hand = (
+        _run(tables, tmp_path, 0.1)
+        for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other"))
+    )
+    # the crank points along the guide's normal: sin(b) = 50 / 200
+    wanted = 60.0 / cos(asin(0.25))
+    for run, pins in ((described, "ABC"), (hand, ("bearing", "crank_pin", "slider_pin"))):
+        for pin in pins:
+            assert np.hypot(run[f"{pin}.fx"], run[f"{pin}.fy"])[0] == pytest.approx(wanted, rel=1e-6)
+    assert syn.pin_forces(crank, make).force[0, :3] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_load_that_the_slider_cranks_case_leaves_out_is_named(linkwork, tmp_path) -> None:
+    case = 'task = {{ kind = "quick-return", stroke = 0.1, time_ratio = 1.1 }}\nmake = {{ load = [{}, {}] }}\n'
+    for load, noted in (((-30.0, 0.0), False), ((-30.0, -4.0), True)):
+        (tmp_path / "case.toml").write_text(case.format(*load))
+        said = linkwork("synthesize", "case.toml", "--no-plots").stderr
+        assert ("without the 4 N of make.load across the guide" in said) == noted
+        assert ("across the guide" in Path("out/slider-crank.toml").read_text().partition("\n")[0]) == noted
+
+
+def _run(tables, folder, stop_time):
+    ran = read_case(tables, folder=folder)
+    return simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=stop_time, step=stop_time / 20.0)
 
 
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:

@@ -511,6 +511,21 @@ def run_case(solution: Solution, make: MachineSpec, title: str) -> dict[str, Any
     }
 
 
+def neglected_load(linkage: Linkage, make: MachineSpec) -> str:
+    """Return a sentence that says which part of the load the case of `run_case` leaves out; empty if it has the whole load."""
+    if not isinstance(linkage, SliderCrank) or not any(make.load):
+        return ""
+    across, along = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
+    if not linkage.point_is_pin:
+        return "slider-crank.toml is without make.load, since its plant has no force at P; linkage.toml has it"
+    if abs(across) <= 1e-9 * hypot(across, along):
+        return ""
+    return (
+        f"slider-crank.toml is without the {abs(across):.4g} N of make.load across the guide, "
+        "since its plant has only a force along it; linkage.toml has both"
+    )
+
+
 def settle_slider(
     parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
 ) -> tuple[float, float]:
@@ -545,7 +560,7 @@ def described_case(solution: Solution, make: MachineSpec, title: str) -> dict[st
     elif moved:
         turn = tau / make.speed
         run = {"stop_time": with_unit(2.0 * linkage.turns * turn, "s"), "step": with_unit(turn / 360.0, "s")}
-    return {"title": title, "linkage": tables, **moved, **loads(linkage, make), "run": run}
+    return {"title": title, "linkage": tables, **moved, **loads(make), "run": run}
 
 
 def description(
@@ -621,8 +636,11 @@ def description(
         }
     if "slides" in tables and (spring := _spring_table(make)):
         tables["springs"] = {"slider": {"at": "guide"} | spring}
-    if acting := loads(linkage, make):
+    if acting := loads(make):
         tables["loads"] = list(acting)
+        if not linkage.point_distance:
+            # a load on the pin would act on the crank
+            bodies["coupler"]["points"] = {"P": [0, 0]}
     return tables
 
 
@@ -637,13 +655,9 @@ def _spring_table(make: MachineSpec) -> dict[str, Any]:
     return {name: with_unit(value, unit) for name, (value, unit) in values.items() if value}
 
 
-def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
-    """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
-    if not any(make.load):
-        return {}
-    # the coupler point may be the pin B
-    point = "P" if linkage.point_distance else "B"
-    return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
+def loads(make: MachineSpec) -> dict[str, Any]:
+    """Return the table with the load of ``make`` at the coupler point P; empty without a load."""
+    return {"P": {f"load_{a}": with_unit(force, "N") for a, force in zip("xy", make.load)}} if any(make.load) else {}
 
 
 def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
@@ -696,5 +710,6 @@ def _point_entry(z: complex) -> list[Any]:
 def _bar_table(ends: str, length: float, make: MachineSpec, mass: float | None) -> dict[str, Any]:
     """Return the table of a bar with the section of ``make``, and with ``mass`` (kg) if it is given."""
     section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
-    table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}
+    section["material"] = with_unit(make.density, "kg/m3")
+    table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section}
     return table if mass is None else table | {"mass": with_unit(mass, "kg")}
