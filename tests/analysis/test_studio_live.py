@@ -262,7 +262,7 @@ def test_no_motion_passes_over_a_change_point(page: Any) -> None:
         case = Case(title="", parameters=parameters, inputs=inputs, initial=start, stop_time=0.1)
         orbit = _load(page, page_state(case))["answer"]["orbit"]
         assert orbit["found"] == found
-        assert ("limit of assembly" in orbit["sentence"]) != found
+        assert ("the links cannot be joined" in orbit["sentence"]) != found
 
 
 @in_browser
