@@ -171,6 +171,7 @@ def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, n
 
 def _verdict(solution: Solution) -> str:
     v = solution.verdicts
-    angle = degrees(min(v.least_transmission, np.pi - v.greatest_transmission))
     wrong = ", ".join(defect.removesuffix(" defect") for defect in v.defects)
-    return f"{v.grashof}\n" + (f"defects: {wrong}" if wrong else f"sound, {angle:.0f} deg from a dead centre")
+    return f"{v.grashof}\n" + (
+        f"defects: {wrong}" if wrong else f"sound, {degrees(v.transmission_margin):.0f} deg from a dead centre"
+    )

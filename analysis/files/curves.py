@@ -17,7 +17,7 @@ from ..units import INCH, LENGTHS, quantity
 from .outputs import note_assumed_units
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
-from .tables import BROKEN_NUMBER, NO_UNIT, SEPARATOR_LINE, heading_unit, units_below
+from .tables import NO_UNIT, SEPARATOR_LINE, heading_unit, is_meant_as_number, units_below
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6, "q": 0.25e-3}
@@ -145,7 +145,7 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
         try:
             x, y = (float(cell) for cell in cells)
         except ValueError:
-            if not rows and not header and not any(is_number(c) or BROKEN_NUMBER.fullmatch(c) for c in cells):
+            if not rows and not header and not any(map(is_meant_as_number, cells)):
                 header = line
                 continue
             if not rows and below is None and len(cells) == 2 and not any(map(NO_UNIT.match, cells)):

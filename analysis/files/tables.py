@@ -104,6 +104,11 @@ _FORMULA = tuple("=+-@")
 _SPLITTING = ',;\t"'
 
 
+def is_meant_as_number(cell: str) -> bool:
+    """Return whether a cell is a number, also one that Python does not read, and therefore no heading."""
+    return is_number(cell) or _BROKEN_NUMBER.fullmatch(cell) is not None
+
+
 def read_record(
     path: str | Path, names: Sequence[str | None] | None = None
 ) -> tuple[list[str], list[NDArray[np.float64]]]:
@@ -152,7 +157,7 @@ def read_record(
         return cell.strip() if separator == "," else cell.strip().replace(",", ".")
 
     first = as_number(rows[0][1][0]) if rows else "0"
-    header = [] if is_number(first) or BROKEN_NUMBER.fullmatch(first) else rows.pop(0)[1]
+    header = [] if is_meant_as_number(first) else rows.pop(0)[1]
     units = [heading_unit(name) for name in header]
     if header and rows and not any(map(NO_UNIT.match, rows[0][1])):
         units = units_below(units, *rows.pop(0)[::-1], path)
@@ -198,7 +203,7 @@ def read_record(
 #: Line that tells Excel which mark is between the cells.
 SEPARATOR_LINE = re.compile(r"\"?sep=", re.IGNORECASE)
 #: A number that Python does not read, such as "1 234", "1,234.5", or one with a minus sign of typography: no heading.
-BROKEN_NUMBER = re.compile(r"[-+\u2212\d.,'\s]*\d[-+\u2212\d.,'\sEeDd]*")
+_BROKEN_NUMBER = re.compile(r"[-+\u2212\d.,'\s]*\d[-+\u2212\d.,'\sEeDd]*")
 #: A cell that cannot be a unit below a heading.
 NO_UNIT = re.compile(r"[\s\[(]*[-+.,]*(?:\d|(?:nan|inf|infinity)\s*$)", re.IGNORECASE)
 

@@ -416,25 +416,15 @@ def force_turn(
     moving = ShiftMotion(
         *(array_per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
     )
-    p = with_groove(parameters.constants(), shift)
-    reached = plant_functions().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
+    f, p = plant_functions(), with_groove(parameters.constants(), shift)
+    reached = f.assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
         raise _assembly_error(parameters, shift, th, moving.shift, reached)
     unreachable = th[~reached]
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = solve(
-            plant_functions(),
-            p,
-            th,
-            moving,
-            w,
-            e,
-            given=given,
-            torque=torque is not None,
-            groove=has_shaft_groove(shift),
-        )
+        found = solve(f, p, th, moving, w, e, given=given, torque=torque is not None, groove=has_shaft_groove(shift))
     n, m, r = th.size, found.motion, found.reactions
     never = np.zeros(n, dtype=bool)
     dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1

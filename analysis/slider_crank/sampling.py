@@ -369,16 +369,8 @@ def _sample_angle(turn: ForceTurn, i: int, errors: FloatArray, quantities: tuple
     missed, dead = evaluate_samples(code, width(), np.array(instant(turn, i)), values, errors, least_lever, found)
     found = found[:, : found.shape[1] - missed - dead]
     across = with_pole and found.size > 0 and bool(found[-2].min() < 0.0 < found[-2].max())
-    statistics: dict[str, tuple[Any, ...]] = {}
-    for name, x in zip(quantities, found):
-        try:
-            statistics[name] = _statistics(x)
-        except OverflowError as error:
-            raise InputError(
-                f"{name} is {x.min():.3g} to {x.max():.3g} {QUANTITIES[name]} in the samples at {_angle(turn, i)}: its "
-                "variance is too large for a floating-point number; are all values in the right units?"
-            ) from error
-    return _Draws(statistics, across, missed, dead)
+    here = _angle(turn, i)
+    return _Draws({name: _statistics(name, x, here) for name, x in zip(quantities, found)}, across, missed, dead)
 
 
 def _compile(turn: ForceTurn, names: tuple[str, ...], quantities: tuple[str, ...]) -> MachineCode:
@@ -410,8 +402,11 @@ def _compile_problem(
         return MachineCode([casadi.Function("sample", arguments, [casadi.densify(out)], {"cse": True})], width())
 
 
-def _statistics(values: FloatArray) -> tuple[Any, ...]:
-    """Return the fields of `Spread` for the samples at one angle, NaN without samples; OverflowError if they are too large."""
+def _statistics(name: str, values: FloatArray, here: str) -> tuple[Any, ...]:
+    """Return the fields of `Spread` for the samples of a quantity at the angle ``here``, NaN without samples.
+
+    Raises InputError if the variance is too large for a number.
+    """
     if values.size < 2:
         none = np.nan
         return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
@@ -419,7 +414,10 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
         mean, deviation = float(values.mean()), float(values.std(ddof=1))
     # the kernels write outside their arrays if the range of the values is not finite
     if not isfinite(deviation):
-        raise OverflowError
+        raise InputError(
+            f"{name} is {values.min():.3g} to {values.max():.3g} {QUANTITIES[name]} in the samples at {here}: its "
+            "variance is too large for a floating-point number; are all values in the right units?"
+        )
     places = np.array(PERCENTILES) / 100.0 * (values.size - 1)
     below = np.minimum(places.astype(int), values.size - 2)
     low, first, last, high, *around = order_statistics(
@@ -431,15 +429,8 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
     counts = np.zeros(_BINS, dtype=np.int64)
     count_in_bins(values, first, end, counts)
     percentiles = lower + (places - below) * (upper - lower)
-    return (
-        mean,
-        deviation,
-        percentiles,
-        low,
-        high,
-        np.linspace(first, end, _BINS + 1),
-        counts,
-    )
+    edges = np.linspace(first, end, _BINS + 1)
+    return mean, deviation, percentiles, low, high, edges, counts
 
 
 def order_statistics(values: FloatArray, places: NDArray[np.int64]) -> FloatArray:

@@ -143,25 +143,26 @@ static double clearance(double angle, const double y[]) {
 }
 
 /* The step, shortened so that no freedom, at its rate, moves by more than its reach, and the clearance falls by no more than half;
-   `rates` are those of z. */
-static double bounded_step(double step, double angle, const double z[], const double rates[], const double scale[]) {
+   `rates` are those of z, and `gap` is its clearance. */
+static double bounded_step(double step, double angle, const double z[], const double rates[], const double scale[],
+                           double gap) {
     double ahead[MOST];
     step = fmin(step, reach[CRANK < 0 ? 0 : CRANK]);
     for (int i = 0; i < section.size && section.place[i] < FREEDOMS; i++)
         if (step * fabs(rates[i]) > reach[section.place[i]] * scale[i])
             step = reach[section.place[i]] * scale[i] / fabs(rates[i]);
     for (int i = 0; i < section.size; i++) ahead[i] = z[i] + PROBE * step * rates[i];
-    return step_short_of_limit(step, clearance(angle, z), clearance(angle + PROBE * step, ahead));
+    return step_short_of_limit(step, gap, clearance(angle + PROBE * step, ahead));
 }
 
 /* Take z from one angle, which becomes the angle reached, to another; `proposal` is the step to begin with, and then that to go on
    with. */
 static bool across(double *from, double to, double z[], const double scale[], int length, double tolerance, double *proposal) {
     static double k[STAGES * LENGTH];
-    double result[LENGTH], begin = *from, done = 0.0, whole = to - begin;
+    double result[LENGTH], begin = *from, done = 0.0, whole = to - begin, gap = clearance(begin, z);
     for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
         if (!slope(NULL, *from, z, k, length)) return false;
-        *proposal = bounded_step(*proposal, *from, z, k, scale); /* the step after a shortened one grows from it */
+        *proposal = bounded_step(*proposal, *from, z, k, scale, gap); /* the step after a shortened one grows from it */
         bool last = *proposal >= whole - done;
         double h = fmin(*proposal, whole - done);
         double error = attempt_step(slope, NULL, *from, z, h, k, scale, length, result) / tolerance;
@@ -173,7 +174,8 @@ static bool across(double *from, double to, double z[], const double scale[], in
             memcpy(z, result, (size_t)length * sizeof *z);
             done = last ? whole : done + h;
             *from = last ? to : begin + done;
-            if (!(clearance(*from, z) >= LIMIT_CLEARANCE)) return false;
+            gap = clearance(*from, z);
+            if (!(gap >= LIMIT_CLEARANCE)) return false;
         } else if (least) {
             return false;
         }

@@ -203,6 +203,11 @@ class Verdicts:
         """Return whether there is no circuit, branch or order defect."""
         return not self.defects
 
+    @property
+    def transmission_margin(self) -> float:
+        """Return the least difference of the transmission angle from 0 and pi (rad), where coupler and rocker are collinear."""
+        return min(self.least_transmission, pi - self.greatest_transmission)
+
     def __str__(self) -> str:
         words = [self.grashof, "full turn" if self.full_turn else "no full turn", *self.defects]
         angles = f"{degrees(self.least_transmission):.1f} to {degrees(self.greatest_transmission):.1f} deg"
@@ -512,8 +517,7 @@ def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
 
     def place(solution: Solution) -> tuple[bool, float, float]:
         exact, verdicts = solution.error <= EXACT * normal_form(solution.task).unit ** 2, solution.verdicts
-        off = min(verdicts.least_transmission, pi - verdicts.greatest_transmission)
-        return not verdicts.sound, 0.0 if exact else solution.value, -off
+        return not verdicts.sound, 0.0 if exact else solution.value, -verdicts.transmission_margin
 
     return tuple(sorted(solutions, key=place))
 
