@@ -22,7 +22,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, frequency_response, newton_orbit
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.probe import probe
-from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, read_case, simulate, simulate_many
+from analysis.run import Inputs, Trajectory, check, compare, cosimulate, load_case, read_case, simulate, simulate_many
 from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
 from analysis.synthesis.result.output import description, drives
@@ -755,3 +755,20 @@ def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
             last = values()
     assert last != first
     page.close()
+
+
+@pytest.mark.fmu
+def test_check_of_a_linkage_whose_pin_has_friction(tmp_path):
+    # at this speed a step of the run in process passed over a reversal of the friction at a tolerance of 1e-11
+    tables = {
+        "name": "wiper-arm", "ground": {"A": [0, 0], "D": ["180 mm", "20 mm"]}, "assembly": {"C": 1},
+        "bodies": {
+            "crank": {"bar": ["A", "B"], "length": "45 mm", "mass": 0.035, "inertia": 6e-6},
+            "coupler": {"bar": ["B", "C"], "length": "190 mm", "mass": 0.117, "inertia": 3.5e-4},
+            "arm": {"bar": ["D", "C"], "length": "60 mm", "mass": 0.6, "inertia": 0.02},
+        },
+        "friction": {"C": "1 mm"}, "freedoms": {"crank": {"joint": "A", "speed": "45 rpm"}},
+    }  # fmt: skip
+    case = read_case({"linkage": tables, "drive": {"speed": "39 rpm"}}, folder=FOLDER)
+    file = build_native(find_mechanism(case.parameters), NATIVE, tmp_path)
+    assert check(file, case, interface="model-exchange")[2].agrees
