@@ -123,6 +123,34 @@ def test_basins_do_not_depend_on_the_length_of_the_bodies() -> None:
     assert set(short.ends.ravel()) == {0, 1}
 
 
+def test_basins_of_vibrations_that_are_slow_beside_the_crank_are_those_of_a_runge_kutta_method() -> None:
+    """Ten turns of an unbalance per vibration in one of two wells: there a rate of 1 % of the scale leaves the well."""
+    built = linkage("wells", ground={"O": (0, 0)})
+    built.body("carriage", points={"P": (0, 0)}, mass=1.0)
+    built.body("rotor", bar=("P", "E"), length=0.1, mass=1.0, cog=(5e-4, 0), inertia=0.01)
+    built.slide("rail", body="carriage", through="O")
+    built.spring("wells", at="rail", law="4e6*x**3 - 100*x + 4*v")
+    rig = built.freedom("rotor", "P", speed=100.0).freedom("across", "rail").mechanism().first_set.parameters
+    found = basins(rig, Drive(speed=100.0), points=8, position=(-0.006, -0.004), rate=(-0.1, 0.1))
+
+    def rates(angle: float, y: np.ndarray) -> np.ndarray:
+        x, v = y
+        force = 0.05 * 100.0 * np.cos(angle) - 4e6 * x**3 + 100.0 * x - 4.0 * v
+        return np.array([v, 0.5 * force]) / 100.0
+
+    y, h = np.array(np.meshgrid(found.position, found.rate)), 2.0 * pi / 32.0
+    for n in range(32 * 150):
+        a = rates(n * h, y)
+        b = rates((n + 0.5) * h, y + 0.5 * h * a)
+        c = rates((n + 0.5) * h, y + 0.5 * h * b)
+        y = y + h / 6.0 * (a + 2.0 * (b + c) + rates((n + 1) * h, y + h * c))
+    starts = np.array([motion.start for motion in found.motions])
+    apart = np.abs(y[0] - starts[:, 0, None, None])
+    assert apart.min(axis=0).max() < 1e-6
+    assert found.ends.tolist() == apart.argmin(axis=0).tolist()
+    assert len(set(found.ends.ravel())) == 2
+
+
 @pytest.mark.parametrize("damping", [0.75, 0.8, 1.0])
 def test_a_resonance_beside_a_fold_is_found(damping: float) -> None:
     """Peak by harmonic balance, where the backbone meets the amplitude that the damper allows; a fold is within 1e-4 of it."""

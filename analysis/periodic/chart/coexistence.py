@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations, product
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
@@ -39,6 +40,8 @@ SAMPLES = 64
 #: For basins: greatest distance from a motion at which a start has settled on it, relative to the scale and to the distance of
 #: the nearest other motion; bound of the integrator's local error relative to this distance; turns at most.
 _NEAR, _APART, _TOLERANCE, _TURNS = 1e-2, 0.2, 1e-4, 3000
+#: Growth per period of the deviations whose distances `_measures` weighs down, so that it measures without damping, too.
+_GROWTH = 1.001
 #: Default plane of basins: its width relative to the range of the motions, and the range relative to the scale below which a
 #: coordinate counts as at rest.
 _WIDTH, _REST = 1.5, 1e-9
@@ -434,12 +437,14 @@ def basins(
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
-    row = point_row([point], known[0])
-    near = min(_NEAR, _APART * _least_distance(found.orbits, row.scales[0]))
+    row, measures = point_row([point], known[0]), _measures(point, found)
     ends, computed = compute_rows(
-        partial(_ends, point, known, near, place, across),
+        partial(_ends, point, known, measures, place, across),
         up.tolist(),
-        [row_name(row, known, (*_FOLLOWED, GAP), code, near, place, *across, value) for value in up.tolist()],
+        [
+            row_name(row, known, (*_FOLLOWED, GAP), code, *measures.ravel(), place, *across, value)
+            for value in up.tolist()
+        ],
         (points,),
         kernels.settle_starts,
         folder=folder,
@@ -452,16 +457,26 @@ def basins(
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed, place=place)
 
 
-def _least_distance(orbits: Sequence[PeriodicOrbit], scale: FloatArray) -> float:
-    """Return the least distance of two motions at crank angle 0, relative to the scale; infinity for a single motion."""
-    passed = [orbit.passages() for orbit in orbits]
-    return min(
-        (
-            float(np.abs(orbits[0].flow.remove_turns(a[:, None] - b) / scale).max(axis=2).min())
-            for a, b in combinations(passed, 2)
-        ),
-        default=np.inf,
-    )
+def _measures(point: OperatingPoint, found: Orbits) -> FloatArray:
+    """Return a matrix for each passage of the stable motions at crank angle 0, shape (k, n, n): see `kernels.settle_starts`.
+
+    The distance from a motion is measured by Lyapunov's quadratic form, which falls from period to period. It is that of the
+    scale in the direction in which the form is least. A position and a rate may be equally far by the scale of y, while a free
+    vibration much slower than the crank has one for an amplitude of a hundred times the other.
+    """
+    passed, measures = [orbit.passages() for orbit in found.orbits], []
+    scale, unit = point.scale(passed[0][0]), np.eye(point.flow.size)
+    for orbit, starts in zip(found.orbits, passed):
+        if not any(orbit is motion for motion in found.stable):
+            continue
+        others = np.vstack([np.empty((0, len(scale))), *(p for p in passed if p is not starts)])
+        for start in starts:
+            decay = point.period(start, orbit.periods).monodromy * scale / scale[:, None] / _GROWTH
+            form = scipy.linalg.solve_discrete_lyapunov(decay.T, unit)
+            measure = np.linalg.cholesky(form / np.linalg.eigvalsh(form)[0]).T / scale
+            apart = np.linalg.norm(point.flow.remove_turns(others - start) @ measure.T, axis=1)
+            measures.append(measure / min(_NEAR, _APART * apart.min(initial=np.inf)))
+    return np.array(measures)
 
 
 def find_coordinate(flow: Flow, name: str | None) -> int:
@@ -525,13 +540,18 @@ def describe_turns(flow: Flow, turns: int) -> str:
 
 
 def _ends(
-    point: OperatingPoint, known: FloatArray, near: float, place: int, across: FloatArray, rates: Sequence[float]
+    point: OperatingPoint,
+    known: FloatArray,
+    measures: FloatArray,
+    place: int,
+    across: FloatArray,
+    rates: Sequence[float],
 ) -> FloatArray:
     """Return for each start an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
     A start is the first known motion with other values of one coordinate and its rate: the coordinate with the index ``place``
-    in y is one value of ``across``, shape (points,); the rate is one of ``rates``, the same in a row. ``near`` is the distance,
-    relative to the scale, at which a start has settled.
+    in y is one value of ``across``, shape (points,); the rate is one of ``rates``, the same in a row. ``measures`` are those of
+    `_measures`.
     """
     starts = np.tile(known[0], (len(rates) * len(across), 1))
     starts[:, place], starts[:, point.flow.size // 2 + place] = (
@@ -539,6 +559,7 @@ def _ends(
         np.repeat(rates, len(across)),
     )
     ends = np.zeros(len(starts), dtype=np.int64)
+    near = 1.0 / float(np.linalg.norm(measures * point.scale(known[0]), ord=2, axis=(1, 2)).max())
     section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE * near)
-    kernels.settle_starts(section, point.flow.period, near, _TURNS, starts, known, ends)
+    kernels.settle_starts(section, point.flow.period, _TURNS, starts, known, measures, ends)
     return ends.reshape(len(rates), -1).astype(float)

@@ -538,21 +538,27 @@ LOST, UNSETTLED = -1, -2
 
 
 @inner
-def _find_known(z, known, near, section, away):
-    """Return the index of the known motion to which the state z is close, or UNSETTLED if there is none.
+def _find_known(z, known, measures, section, away):
+    """Return the index of the known motion on which the state z has settled, or UNSETTLED if there is none.
 
-    Whole turns of angles are ignored. ``near`` is the greatest distance relative to the scale; ``away`` is work space.
+    Whole turns of angles are ignored. ``measures`` are those of `settle_starts`; ``away`` is work space.
     """
     end = UNSETTLED
     for k in range(known.shape[0]):
         subtract_modulo_turns(z, known[k], section.angle_periods, away)
-        if magnitude(away, section.scale) < near:
+        square = 0.0
+        for i in range(away.shape[0]):
+            part = 0.0
+            for j in range(away.shape[0]):
+                part += measures[k, i, j] * away[j]
+            square += part * part
+        if square < 1.0:
             end = k
     return end
 
 
 @part
-def _settle(section, turn, near, most, starts, known, ends, tables):
+def _settle(section, turn, most, starts, known, measures, ends, tables):
     """Do the work of `settle_starts`; ``tables`` is work space whose arrays the caller must keep alive during the call."""
     v, away = refer(tables), np.empty(starts.shape[1])
     # for each lane: the index of its start, or -1, and the number of turns that have been computed
@@ -571,7 +577,7 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
                 else:
                     break
                 row = rows[lane]
-                ends[row] = _find_known(v.z, known, near, section, away) if v.status[lane] == DONE else LOST
+                ends[row] = _find_known(v.z, known, measures, section, away) if v.status[lane] == DONE else LOST
                 if ends[row] != UNSETTLED or turns[lane] == most:
                     rows[lane], v.status[lane] = -1, IDLE
                 else:
@@ -581,24 +587,25 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
         running = advance_tracks(section, v)
 
 
-@kernel(types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]), purpose="basins of attraction")
-def settle_starts(section, turn, near, most, starts, known, ends):
+@kernel(types.void(SECTION, float64, int64, MATRIX, MATRIX, CUBE, int64[::1]), purpose="basins of attraction")
+def settle_starts(section, turn, most, starts, known, measures, ends):
     """Simulate the motion from each start, turn by turn, until it settles on one of the known motions.
 
     Parameters
     ----------
     turn : float
         Crank angle of a turn (rad).
-    near : float
-        Distance from a known start, relative to the scale, at which the motion counts as settled.
     most : int
         Greatest number of turns.
     starts, known : ndarray, shapes (m, n) and (k, n)
         y at crank angle 0 of each start, and of the known motions.
+    measures : ndarray, shape (k, n, n)
+        The motion has settled on a known motion if its difference from the known start, multiplied by this matrix, is shorter
+        than 1.
     ends : ndarray of int64, shape (m,)
         The result, written: for each start the index of the known motion, or `LOST` or `UNSETTLED`.
     """
     tables = make_tracks(section, 0)
     for lane in range(LANES):
         set_mechanism(lane, section, tables)
-    _settle(section, turn, near, most, starts, known, ends, tables)
+    _settle(section, turn, most, starts, known, measures, ends, tables)
