@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import UNITS, Variable
 
 from ..mechanisms import MECHANISMS, find_mechanism, wrapping_outputs
-from ..run import Ensemble, Trajectory
+from ..run import Ensemble, Trajectory, require_list
 from . import style
 from .dispatch import mechanism_drawer, plot
 
@@ -60,6 +60,7 @@ def plot_outputs(run: Trajectory, names: Sequence[str] | None = None, *, title: 
         forces are plotted; constant outputs are left out and stated at the foot.
     title : str
     """
+    require_list(names, "names")
     table, drawer = _variables(run), None
     notes: list[str] = []
     if names is None:
@@ -113,6 +114,7 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
         Outputs to plot, one panel each; by default the first eight that were chosen, or the coordinates.
     title : str
     """
+    require_list(names, "names")
     mechanism = find_mechanism(runs.parameters[0])
     if names is None:
         first, *others = mechanism.freedoms

@@ -40,7 +40,7 @@ def check_derivatives(context: Context, case: int) -> None:
             seed = [rng.gauss(0, 1) for _ in knowns]
             _check_sums(context, run, unknown, knowns, seed, row)
     run.session.free()
-    context.say(f"largest relative error {worst:.1e}{' of ' + name if name else ''}")
+    context.say(f"largest relative error beyond rounding {worst:.1e}{' of ' + name if name else ''}")
 
 
 def _floor(unknown: Variable) -> float:

@@ -5,6 +5,7 @@ from .arguments import complete_speed as complete_speed
 from .arguments import float_array as float_array
 from .arguments import published_set as published_set
 from .arguments import require_kind as require_kind
+from .arguments import require_list as require_list
 from .arguments import takes_published as takes_published
 from .arguments import variant as variant
 from .case_files import COMMON as COMMON

@@ -34,6 +34,10 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
     """
     if isinstance(known, PublishedSet):
         return known
+    if known.endswith((".toml", ".json")):
+        raise InputError(
+            f"{known!r} is a file: give the parameters of analysis.run.load_case({known!r}), or a published set"
+        )
     if known not in PUBLISHED:
         raise files.unknown_name(known, PUBLISHED, f"published set {known!r}")
     return PUBLISHED[known]
@@ -91,6 +95,12 @@ def require_kind(value: Any, kind: type | tuple[type, ...], name: str, wanted: s
     if not isinstance(value, kind):
         shown = repr(value) if value is None or isinstance(value, (str, int, float)) else type(value).__name__
         raise InputError(f"{name} is {shown}: give {wanted}")
+
+
+def require_list(names: object, name: str) -> None:
+    """Raise InputError if an argument is a text where it must be a list of names."""
+    if isinstance(names, str):
+        raise InputError(f"{name} is {names!r}: it must be a list of names, such as [{names!r}]")
 
 
 def float_array(value: ArrayLike, message: str) -> NDArray[np.float64]:
@@ -190,7 +200,8 @@ def usual_times(
     """
     if stop_time is not None:
         return stop_time, 1e-3 if step is None else step
-    turn = turn_durations(inputs, find_mechanism(parameters)) if isinstance(inputs, Inputs) else None
+    mechanism = find_mechanism(parameters)
+    turn = turn_durations(inputs, mechanism) if isinstance(inputs, Inputs) else None
     if turn is None:
         raise InputError(
             "stop_time is missing: a run has three turns by default only where the crank has a constant speed"

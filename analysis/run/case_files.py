@@ -208,7 +208,9 @@ class RunTable:
         if turn is not None:
             return (3.0 if self.revolutions is None else self.revolutions) * turn[0], step
         if self.revolutions is None:
-            raise MissingParameterError("run.stop_time")
+            raise InputError(
+                "run.stop_time is missing: a run lasts three turns by default only if a crank has a constant speed"
+            )
         raise ParameterError("run.revolutions", self.revolutions, "come with a constant speed; give run.stop_time")
 
 

@@ -25,7 +25,7 @@ from ..files import Whole, unknown_name
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import WorkersLost, check_jobs, record_interrupts, run_in_parallel, share_memory
 from ..units import Amount, in_si
-from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published
+from .arguments import complete_initial_state, complete_inputs, require_list, takes_options, takes_published
 from .batches import NOT_RUN, Result, Task, hash_code, solve
 from .events import show_progress
 from .inputs import Inputs, check_run, compile_source, encode
@@ -253,8 +253,7 @@ def simulate_many(
     mechanism = find_mechanism(parameters[0])
     if any(find_mechanism(p) is not mechanism for p in distinct_objects(parameters)):
         raise InputError("an ensemble's parameters must all be of one mechanism")
-    if isinstance(outputs, str):
-        raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")
+    require_list(outputs, "outputs")
     names = mechanism.output_names if outputs is None else tuple(outputs)
     columns = tuple(output_column(name, mechanism.output_names) for name in names)
     all_inputs, starts = _check_runs(mechanism, inputs, initial, len(parameters))

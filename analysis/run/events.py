@@ -114,8 +114,10 @@ def show_progress(progress: bool, duration: float, what: str = "running") -> Ite
     if not progress:
         yield lambda done: None
         return
+    from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(transient=True) as bar:
+    console = Console()
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=duration)
         yield lambda done: bar.update(task, completed=done)

@@ -31,7 +31,7 @@ from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
 from ..numerics.tracing import ReboundFunctions
-from ..run import require_kind
+from ..run import require_kind, require_list
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
@@ -286,8 +286,7 @@ def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None
 
     Raises UnknownNameError if one does not, and InputError if a text is given instead of a list.
     """
-    if isinstance(names, str):
-        raise InputError(f"{kind} is {names!r}: it must be a list of names, such as [{names!r}]")
+    require_list(names, kind)
     for name in names:
         if name not in known:
             raise unknown_name(name, known, f"{kind} {name!r}")

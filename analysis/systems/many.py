@@ -20,7 +20,7 @@ from linkwork.errors import InputError, LinkworkError
 from ..display import format_count
 from ..files import unknown_name
 from ..numerics.workers import WorkersLost, record_interrupts, run_in_parallel
-from ..run import CosimulationError, show_progress
+from ..run import CosimulationError, float_array, require_kind, require_list, show_progress
 from ..units import Amount, in_si
 from .master import count_steps, run_system
 from .wiring import End, Part, Wiring
@@ -138,6 +138,8 @@ def run_many(
     UnknownNameError
         If there is no such variable or output.
     """
+    require_kind(wiring, Wiring, "wiring", "a Wiring, such as load_system(FILE).wiring()")
+    require_list(outputs, "outputs")
     step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time
     sets = _value_rows(wiring, vary)
     known = [f"{name}.{output}" for name, part in wiring.parts.items() for output in part.real_variables("output")]
@@ -170,7 +172,12 @@ def run_many(
 
 def _value_rows(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
     """Check the varied values and return them as an array by run and variable."""
-    arrays = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in vary.items()}
+    arrays = {
+        name: np.atleast_1d(
+            float_array(values, f"{name} varies over {values!r:.200}: the values must be numbers in SI")
+        )
+        for name, values in vary.items()
+    }
     known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.real_variables(k)]
     for name in arrays:
         if name not in known:

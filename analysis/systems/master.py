@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..numerics.workers import record_interrupts
-from ..run import CosimulationError, RunInterrupted, show_progress, unwrap
+from ..run import CosimulationError, RunInterrupted, require_kind, show_progress, unwrap
 from ..units import Amount, in_si
 from .instances import Floats, make_instance
 from .wiring import Bond, End, Wiring
@@ -352,6 +352,7 @@ def run_system(
         part cannot restore its state, if ``share`` is not positive or there is no power bond for it, or if a part needs equal
         steps and does not get them.
     """
+    require_kind(wiring, Wiring, "wiring", "a Wiring, such as load_system(FILE).wiring()")
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
     step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time

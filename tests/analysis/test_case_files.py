@@ -210,7 +210,7 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
             'published = "table-3.1"\n[load]\nfx = {kind = "table", times = [0, 1], values = [1, 2], interpolation = "step"}',
             r"load\.fx\.interpolation 'step'",
         ),
-        ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing"),
+        ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing: .* a constant speed"),
         ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bra"\ntorque = 1', "torsion-bar"),
         ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"', r"drive\.torque\.torque is missing"),
         ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "drive .*only one of torque, speed"),

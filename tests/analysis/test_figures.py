@@ -25,7 +25,7 @@ from analysis.figures.curves import Arrow, Label
 from analysis.figures.style import GROUND
 from analysis.files import WritingError, save_figure
 from analysis.mechanisms import MECHANISMS
-from linkwork.errors import AssemblyError
+from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.slider_crank.published import SETS as SLIDER_CRANKS
 
@@ -172,6 +172,13 @@ def test_a_type_that_has_no_picture_is_named(picture) -> None:
     with pytest.raises(figures.DrawingError, match=r"type dict have no") as refused:
         picture({})
     assert refused.value.kind is dict
+
+
+def test_outputs_to_plot_are_a_list(run) -> None:
+    with pytest.raises(InputError, match=r"such as \['slider.position'\]"):
+        figures.plot(run, "slider.position")
+    with pytest.raises(InputError, match=r"such as \['slider.position'\]"):
+        figures.plot(simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.01), "slider.position")
 
 
 def test_comparison(run) -> None:

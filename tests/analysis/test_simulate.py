@@ -725,6 +725,11 @@ def test_progress_is_the_time_since_the_start(monkeypatch: pytest.MonkeyPatch) -
     assert told == pytest.approx([0.2, 0.2])
 
 
+def test_progress_is_shown_on_a_terminal_only(capfd: pytest.CaptureFixture[str]) -> None:
+    simulate(TABLE_3_1, Inputs(speed=20.0), stop_time=0.1, progress=True)
+    assert capfd.readouterr() == ("", "")
+
+
 # --- What is refused
 
 

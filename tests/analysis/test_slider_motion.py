@@ -374,6 +374,7 @@ def test_what_cannot_be_joined_is_infeasible() -> None:
     ("options", "words"),
     [
         ({"harmonics": -1}, "harmonics"),
+        ({"harmonics": 2.5}, "harmonics is 2.5: it must be a whole number"),
         ({"harmonics": 1, "stroke": 0.0}, "greatest stroke"),
         ({"harmonics": 1, "speed": -1.0}, "greatest speed"),
         ({"harmonics": 1, "acceleration": float("nan")}, "greatest acceleration"),

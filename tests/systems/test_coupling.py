@@ -247,6 +247,8 @@ def test_wrong_arguments_are_refused() -> None:
     wiring = wiring_of("motor-crank")
     with pytest.raises(UnknownNameError, match="rollback"):
         run_system(wiring, coupling="roll")
+    with pytest.raises(InputError, match=r"wiring is System: give .*wiring\(\)"):
+        run_system(system_of("motor-crank"))
     for step, stop_time in ((2.0, 1.0), (0.0, 1.0), (1e-3, inf)):
         with pytest.raises(InputError, match="communication step"):
             run_system(wiring, step=step, stop_time=stop_time)

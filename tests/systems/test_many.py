@@ -15,7 +15,7 @@ from analysis.systems import SystemRuns, SystemRunsEnded, many, run_many, run_sy
 from linkwork.errors import InputError, UnknownNameError
 
 from ..analysis.test_workers import killing, new_cluster
-from .conftest import wiring_of
+from .conftest import system_of, wiring_of
 
 OUTPUTS = ["linkage.crank.speed", "linkage.slider.position"]
 SPRINGS = np.linspace(500.0, 2500.0, 40)
@@ -112,6 +112,14 @@ def test_wrong_arguments_are_refused() -> None:
     for vary in ({}, {"linkage.slider.stiffness": [1.0, 2.0], "linkage.slider.damping": [1.0]}):
         with pytest.raises(InputError, match="one of each for every run"):
             run_many(wiring, vary, OUTPUTS)
+    with pytest.raises(
+        InputError, match=r"slider\.stiffness varies over \['8 N/mm'\]: the values must be numbers in SI"
+    ):
+        run_many(wiring, {"linkage.slider.stiffness": ["8 N/mm"]}, OUTPUTS)
+    with pytest.raises(InputError, match=r"such as \['linkage\.crank\.speed'\]"):
+        run_many(wiring, {"linkage.slider.stiffness": [1.0]}, "linkage.crank.speed")
+    with pytest.raises(InputError, match=r"wiring is System: give .*wiring\(\)"):
+        run_many(system_of("motor-crank"), {}, OUTPUTS)
     for wrong in ({"step": 0.0}, {"stop_time": inf}, {"every": 0}):
         with pytest.raises(InputError, match="communication step"):
             run_many(wiring, {"linkage.slider.stiffness": [1.0]}, OUTPUTS, **wrong)

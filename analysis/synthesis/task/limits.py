@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 
-from ...files import unknown_name
+from ...files import Whole, unknown_name
 from ...units import Amount, in_si
 from ..linkage.linkage import ANGLES, LINKS, FiveBar, Kind, Linkage, SliderCrank, gear_turns
 from .constraint import (
@@ -71,8 +71,7 @@ class SliderUnknown:
     acceleration: Amount = inf
 
     def __post_init__(self) -> None:
-        if self.harmonics < 0:
-            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        Whole(least=0)(self.harmonics, "harmonics")
         low, high = self.guide_angle
         if not (isfinite(low) and isfinite(high) and low <= high):
             raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
@@ -111,8 +110,7 @@ class CrankUnknown:
         if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
             raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
         gear_turns(self.ratio)
-        if self.harmonics < 0:
-            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        Whole(least=0)(self.harmonics, "harmonics")
 
 
 PivotUnknown = SliderUnknown | CrankUnknown
