@@ -194,7 +194,8 @@ def run_page(name, tmp_path):
             continue
         if kind == "python":
             python += block
-            runs = [[sys.executable, "-c", python]]
+            (script := tmp_path / "page.py").write_text(python, encoding="utf-8")  # processes import it, as a reader's
+            runs = [[sys.executable, str(script)]]
         else:
             runs = [
                 [sys.executable, "-m", "analysis.cli", *shlex.split(line)[1:]] for line in block.strip().splitlines()
