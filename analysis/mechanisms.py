@@ -181,7 +181,7 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
 
 
 class OfAll(Mapping[str, Any]):
-    """What all known mechanisms have, by name: ``own`` returns what one mechanism has."""
+    """Entries of all known mechanisms, by name; ``own`` returns those of one mechanism."""
 
     def __init__(self, what: str, own: Callable[[Mechanism], Mapping[str, Any]]) -> None:
         self._what, self._own = what, own

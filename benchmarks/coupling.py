@@ -39,7 +39,7 @@ CONSOLE = Console(width=128)
 
 
 def show(found: Convergence, powers: bool = True) -> None:
-    """Print errors and orders; with ``powers`` also the ratio of the error to the share of work that the coupling has added."""
+    """Print errors and orders; with ``powers`` also each error divided by the share of work that the coupling has added."""
     table = Table(title=f"{found.title}: greatest relative error")
     for name in ("step [ms]", *found.errors):
         table.add_column(name, justify="right")

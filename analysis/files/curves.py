@@ -231,7 +231,7 @@ def _check_tree(path: Path, root: Any) -> None:
     sizes: dict[int, int] = {}
 
     def size(element: Any, depth: int) -> int:
-        """Return the number of elements in an element, including itself, after each ``<use>`` is replaced by its target."""
+        """Count an element and the elements inside it, with each ``<use>`` replaced by its target."""
         if depth > _DEPTH:
             raise InputError(f"{path} has groups and uses inside each other, deeper than {_DEPTH}, or a use of itself")
         if id(element) not in sizes:
@@ -263,9 +263,9 @@ def _check_tree(path: Path, root: Any) -> None:
 
 
 def _hide_referenced(root: Any, wanted: str | None) -> None:
-    """Put the elements of an SVG drawing that are drawn by a reference only into ``<defs>``, which svgelements does not draw.
+    """Hide from svgelements the parts of an SVG drawing that are drawn only where another element refers to them.
 
-    Those that contain the element with the ``id`` that is wanted stay.
+    They are put into ``<defs>``, which svgelements does not draw, unless they contain the element with the id ``wanted``.
     """
     for parent in list(root.iter()):
         for place, child in enumerate(parent):

@@ -44,7 +44,7 @@ class Writing:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on what was assumed of files, and on the files that had to be kept."""
+        """Sentences on units that were assumed for columns of files, and on old files that were not overwritten."""
         return [f"{path.name}: {text}" for path, text in self.assumed.items()] + self._kept()
 
     def _kept(self) -> list[str]:

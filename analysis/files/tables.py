@@ -105,7 +105,7 @@ _SPLITTING = ',;\t"'
 
 
 def is_meant_as_number(cell: str) -> bool:
-    """Return whether a cell is a number, also one that Python does not read, and therefore no heading."""
+    """Return whether a cell is meant as a number, and not as a heading, even if Python cannot read the number."""
     return is_number(cell) or _BROKEN_NUMBER.fullmatch(cell) is not None
 
 

@@ -183,7 +183,7 @@ def natural_modes(
 
 
 def _check_gap(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> None:
-    """Raise AssemblyError if the links come to the limit of assembly on the straight way between two equilibria."""
+    """Raise AssemblyError if the links cannot be joined in a state on the straight line between two equilibria."""
     p = one.parameters.constants()
     idle, begin, end = mechanism.idle_inputs(p), np.array(one.state), np.array(other.state)
 

@@ -69,9 +69,10 @@ def _names(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _bodies_without_length(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    """Yield bodies whose pins all coincide, except blocks and guides, and bodies all of whose pins are freedoms.
+    """Yield the bodies whose pins all coincide, which may be a mistake.
 
-    A sliding block may carry several rods on one axis, and a shaft a second one by an elastic coupling.
+    Left out are blocks and guides, since a block may carry several rods on one axis, and bodies all of whose pins are freedoms,
+    such as a shaft that carries a second shaft on the same axis.
     """
     freed = {freedom.joint for freedom in d.freedoms.values()}
     sliding = {body for slide in d.slides.values() for body in (slide.body, slide.on)}

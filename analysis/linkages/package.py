@@ -426,9 +426,10 @@ class Package:
         )
 
     def _greatest_rotation(self) -> str:
-        """Write the `Mechanism.greatest_rotation`, for what turns fastest at the springs with a force law and at the dyads.
+        """Write the `Mechanism.greatest_rotation`, the greatest change of an angle in one step of the integrator.
 
-        It is 10 deg at the ends of such a spring, and 20 deg at what carries a dyad, whose limit of assembly may be narrow.
+        In a step the ends of a spring with a force law turn by at most 10 deg relative to each other, and a body that carries a
+        dyad by at most 20 deg, because the range in which the dyad can be assembled may be narrow.
         """
         springs = []
         for spring in self.description.springs.values():

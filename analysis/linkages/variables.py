@@ -141,9 +141,9 @@ class Variables:
     def experiment(self) -> tuple[float, float, float, float]:
         """Return the default experiment of the FMU: start, stop and step (s), tolerance.
 
-        It takes three turns of the slowest crank that turns at the start, about as many as two digits can say, in steps of at
-        most one degree of the fastest crank, but at most `_MOST_STEPS` steps; 1 s in steps of 1 ms if no crank turns. Angles
-        without a drive, such as that of a pendulum on a crank, count only if no other angle moves.
+        It takes three turns of the slowest crank that turns at the start, rounded to two digits, in steps of at most one degree
+        of the fastest crank, but at most `_MOST_STEPS` steps. If no crank turns, it takes 1 s in steps of 1 ms. Angles without
+        a drive, such as that of a pendulum on a crank, count only if no other angle moves.
         """
         moving = [d for d in self.interface.drives if d.turns and d.speed]
         for d in moving:

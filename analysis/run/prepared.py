@@ -265,8 +265,8 @@ class Run:
     def describe_failed_step(self, x: NDArray[np.float64]) -> str:
         """Return why no step succeeds at the state x: springs whose law has no value just beyond it, or a missing mass.
 
-        If neither is the case, the step size is told. The laws are evaluated at the positions 1 us and 1 ms after the state,
-        extrapolated with constant rates.
+        If neither is the case, the text gives the step size. The laws are evaluated at the positions 1 us and 1 ms after the
+        state, extrapolated with constant rates.
         """
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))

@@ -91,7 +91,7 @@ def leading_error(n, x, y, k, h, scale, lane, lanes):
 
 @inner
 def bounded_step_size(h, rates, reach, scale, lane, lanes):
-    """Return a step size, shortened so that no component, at its rate, changes by more than its reach times its scale."""
+    """Shorten a step size until no component, at its present rate, changes by more than its reach times its scale."""
     for i in range(reach.shape[0]):
         rate, most = abs(rates[i * lanes + lane]), reach[i] * scale[i * lanes + lane]
         if h * rate > most:
@@ -101,7 +101,7 @@ def bounded_step_size(h, rates, reach, scale, lane, lanes):
 
 @inner
 def step_short_of_limit(h, clearance, ahead):
-    """Return a step size, shortened so that the clearance, at its rate, falls by no more than half; see `PROBE`.
+    """Shorten a step size until the clearance, at its present rate, falls by no more than half; see `PROBE`.
 
     ``ahead`` is the clearance that the rates at the beginning of the step give after the fraction `PROBE` of the step h.
     """

@@ -91,10 +91,11 @@ def solve(
 ) -> Solution:
     """Solve one of the force problems at configurations that can be assembled, on arrays, dual numbers or symbols.
 
-    ``f`` are the equations for these. The other arguments are constants, theta1 (rad), the shift's motion, theta1' (rad/s) and
-    theta1'' (rad/s2); ``given`` is the load (N) or, with ``torque``, the torque (N.m): the load is then sought, which is not
-    finite where the ratio is zero. ``groove`` says whether the parameters' groove makes the shift. The ratio is minus the
-    derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the shift.
+    ``f`` are the equations for such values. The other arguments are constants, theta1 (rad), the shift's motion, theta1'
+    (rad/s) and theta1'' (rad/s2); ``given`` is the load (N) or, with ``torque``, the torque (N.m): the load is then sought,
+    which is not finite where the ratio is zero. ``groove`` says whether the parameters' groove makes the shift. The ratio is
+    minus the derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the
+    shift.
     """
     q = f.position(angle, shift.shift, p)
     k = f.coefficients(q, p)

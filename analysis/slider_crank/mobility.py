@@ -247,7 +247,7 @@ def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> 
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Find the place between ``low`` and ``high`` where ``positive`` changes, by bisection to the last digit."""
+    """Find the place between ``low`` and ``high`` at which ``positive`` changes its value, by bisection to the last digit."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)

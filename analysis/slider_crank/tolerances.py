@@ -254,7 +254,7 @@ def add_errors(
     nominal: Instant,
     errors: Mapping[str, Any],
 ) -> PerturbedTurn:
-    """Add ``errors`` by name to the parameters ``values`` and to the motion; ``f`` are the equations for what these are."""
+    """Add ``errors`` by name to the parameters ``values`` and to the motion; ``f`` are the equations for such values."""
     moved = {field_name(name): values[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)}
     p = f.find(SliderCrankParameters.constants)(SimpleNamespace(**{**values, **moved}))
     angle = nominal.angle + errors.get(ANGLE, 0.0)

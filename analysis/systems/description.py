@@ -163,7 +163,11 @@ class System:
         return found
 
     def _modes(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
-        """Return the drive mode of each freedom: of its connected input, else of one with a start value, else the case's."""
+        """Return the drive mode of each freedom.
+
+        It is the mode of the connected input; without one, that of the input with a start value; without either, that of the
+        case.
+        """
         found = {mode: float(value) for mode, value in inputs.modes(mechanism).items()}
         for number, freedom in enumerate(mechanism.freedoms):
             if freedom.mode is None:

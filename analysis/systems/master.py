@@ -182,9 +182,9 @@ class _Instances:
         self.last = 1.0
 
     def _settle(self) -> None:
-        """Exchange outputs until they no longer change: without algebraic loops for as many rounds as there are parts, at most.
+        """Exchange outputs until they no longer change: without algebraic loops in at most as many rounds as there are parts.
 
-        In a loop that does not settle the values of as many rounds stay.
+        If an algebraic loop does not settle, its values of the last round are kept.
         """
         self.outputs, changes, turn = self._read(), [inf], len(self.instances)
         while len(changes) <= _ROUNDS and changes[-1] > 0.0:

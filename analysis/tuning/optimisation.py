@@ -462,7 +462,7 @@ def _counts(condition: Condition, answer: Answer) -> bool:
 
 
 def _value(condition: Condition, answer: Answer) -> float:
-    """Return the value of a condition; infinite if its motion is lost."""
+    """Return the value of a condition, or infinity if its motion cannot be found."""
     try:
         return condition.value(answer.x)
     except LinkworkError:

@@ -116,7 +116,7 @@ def _stability_reading(found: Survey) -> Reading:
 
 
 def _ends_text(wish: Wish, region: Region) -> str:
-    """Return both ends of a region; an end at which only the branch was not followed further is a bound."""
+    """Return both ends of a region as text; an end at which the branch was followed no further is only a bound."""
     special = [point.parameter for point in (region.first, region.last) if point is not None]
     low, high = (
         wish.say(level) + ("" if any(abs(level - end) < AT_THE_END * wish.size for end in special) else bound)

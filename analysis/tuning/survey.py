@@ -255,9 +255,10 @@ def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """Yield the kinds of crossing of the unit circle possible on a branch: a complex pair needs two multipliers.
+    """Yield the kinds of loss of stability to look for on a branch.
 
-    At a branch point a multiplier is +1, as at a fold.
+    A torus is left out if there is only one multiplier, since it needs a complex pair. A branch point is left out because its
+    multiplier is +1, as at a fold.
     """
     for kind in Crossing:
         if kind is not Crossing.BRANCH_POINT and (kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1):

@@ -405,7 +405,7 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
 
 
 def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
-    """Return the stiffness, for small harmonics, of the boundary below which the motion diverges, the boundary 0.
+    """Return the stiffness of boundary 0, below which the motion diverges, by perturbation for small harmonics.
 
     This is eq (5.13) to second order.
 

@@ -239,7 +239,7 @@ class SliderEquation:
             raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
 
     def homogeneous(self) -> PeriodicEquation:
-        """Return the equation without F and without lambda_k^2, which is the stiffness lambda of `hill_regions`."""
+        """Return the equation with F = 0 and lambda_k^2 = 0; `hill_regions` adds the stiffness again, as its lambda."""
         rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
         b = rate + self.damping * self.damping_factor
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)

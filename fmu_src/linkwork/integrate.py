@@ -209,7 +209,7 @@ def integrate(
 
 
 def bounded_step(step: float, rates: Vector, reach: Vector, scale: Vector) -> float:
-    """Return a step size, shortened so that no component, at its rate, changes by more than its reach times its scale."""
+    """Shorten a step size until no component, at its present rate, changes by more than its reach times its scale."""
     for rate, most, size in zip(rates, reach, scale):
         if step * abs(rate) > most * size:
             step = most * size / abs(rate)
@@ -217,7 +217,7 @@ def bounded_step(step: float, rates: Vector, reach: Vector, scale: Vector) -> fl
 
 
 def _step_short_of_limit(step: float, x: Vector, rates: Vector, clearance: Callable[[Vector], float]) -> float:
-    """Return a step size, shortened so that the clearance, at its rate, falls by no more than half."""
+    """Shorten a step size until the clearance, at its present rate, falls by no more than half."""
     now = clearance(x)
     try:
         fall = now - clearance(tuple(a + PROBE * step * rate for a, rate in zip(x, rates)))

@@ -48,11 +48,13 @@ class UnjoinedMessages(NamedTuple):
     near: str
     reach: Callable[..., tuple[float, ...]] | None = None
 
-    def error(self, sine: float, x: Sequence[float], p: Any, where: str) -> AssemblyError:
-        """Return the error for state x; ``where`` describes x in words.
+    def check(self, sine: float, x: Sequence[float], p: Any, where: str) -> None:
+        """Raise AssemblyError if state x, described in words by ``where``, is at the limit of assembly or beyond it.
 
         ``sine`` is the sine of the angle from the limit of assembly; if the links cannot be joined, it is not positive.
         """
+        if sine >= LIMIT_SINE:
+            return
         if sine > 0.0:
-            return AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(min(1.0, sine))))}")
-        return AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")
+            raise AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(sine)))}")
+        raise AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")

@@ -21,7 +21,7 @@ from math import atan2, cos, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
 from .friction import solve_linear
-from .limits import LIMIT_SINE, UnjoinedMessages
+from .limits import UnjoinedMessages
 
 
 class Vector(NamedTuple):
@@ -162,9 +162,9 @@ def composed_frame(f: Frame, inner: Frame) -> Frame:
 def gear_direction(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
     """Return the direction of a gear that is pinned to a body of direction ``carrier`` and driven by a rack.
 
-    A slide of direction ``line`` joins rack and carrier; ``block`` is the origin of the block of this slide. The distance d of
-    this origin along the line is measured from ``start``, a point of the body that has the line. The angle of the gear relative
-    to the carrier is (d - ``offset``)/``radius``.
+    The rack slides on the carrier along a line of direction ``line``. The line belongs to one of the two bodies, which has the
+    point ``start``; the block on it belongs to the other, which has its origin at ``block``. The travel d is the distance from
+    ``start`` to ``block`` along the line. The angle of the gear relative to the carrier is (d - ``offset``)/``radius``.
     """
     arm = subtract_vectors(block, start)
     way = line.c * arm.x + line.s * arm.y
@@ -664,5 +664,4 @@ def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, wher
         clearance = places(tuple(x), p).clearance
     except (ValueError, ArithmeticError):
         clearance = -1.0
-    if not clearance >= LIMIT_SINE:
-        raise UNJOINED.error(clearance, x, p, where)
+    UNJOINED.check(clearance, x, p, where)

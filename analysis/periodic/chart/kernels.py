@@ -377,7 +377,7 @@ class Job(NamedTuple):
 
 @part
 def _record(at, end, job, carry):
-    """Add a motion to those of the point with the index ``at``, if it is new; ``end`` is its start and monodromy matrix."""
+    """Add a motion, given by its start and monodromy matrix ``end``, to the motions found at point ``at``, if it is new."""
     found, count, n = job.found, job.found.counts[at], job.guesses.shape[1]
     own = point_section(job.section, job.points, at, job.section.tolerance)
     z = end[:n].copy()

@@ -161,7 +161,7 @@ def most_steps(way):
 
 @inner
 def _bounded_size(section, size, angle, z, room):
-    """Return a step size, shortened so that the step passes over no force and no limit of assembly.
+    """Shorten a step size until the step passes over no force and no limit of assembly.
 
     ``room.gap`` has the clearance at z, and ``room.k[0]`` the rates of z.
     """

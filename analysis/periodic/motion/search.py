@@ -502,7 +502,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which undriven links with a ratio in the drive go round, and other links only swing."""
+    """Find the periodic motions in which the undriven links in ``drive.ratios`` go round and the others only swing."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     ranges = start_ranges(point.parameters, point.drive, guess)

@@ -302,8 +302,8 @@ def _grows_towards(arc: Arc, low: float, high: float) -> bool:
 def _resonances(arc: Arc, coordinate: int) -> list[Interval]:
     """Return the half-power bands of the peaks of a coordinate's amplitude along an arc, as ranges of the parameter.
 
-    An end of the arc also counts as a peak if the amplitude is greatest there, or just before it as beside a fold, and if the
-    branch continues on another arc.
+    An end of the arc at which the branch continues on another arc also counts as a peak if the amplitude is greatest at this
+    end, or just before it, as beside a fold.
     """
     a = arc.amplitudes[:, coordinate]
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
@@ -419,7 +419,7 @@ def _locate_extremum(branch: Branch, point: int, sign: int, coordinate: int) -> 
     """Find an extremum of a coordinate's amplitude; return the value of the parameter, and the motion there.
 
     The search starts from the motion with the index ``point`` on the branch, and stays between the values of the parameter at
-    its neighbours. If the parameter turns back there, the extremum lies beside the fold, often so near that it is not told from
+    its neighbours. If the parameter turns back there, the extremum lies beside the fold, often too near to be told from
     the fold. The result is None if there is no fold, as at a branch point. ``sign`` is +1 for a maximum, -1 for a minimum.
     """
     family, orbit, begin = branch.family, branch.orbits[point], float(branch.parameter[point])

@@ -480,7 +480,7 @@ def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _test_value(point: Point, kind: Crossing, sign: float = 1.0) -> float:
-    """Return ``sign`` times a test function: for a fold the parameter's change along the branch, else `crossing_test`."""
+    """Return ``sign`` times a test function: the parameter's change along the branch for a fold, otherwise `crossing_test`."""
     return sign * float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
 
 

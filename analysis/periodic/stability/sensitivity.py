@@ -339,7 +339,7 @@ def extremum_gradient(
 ) -> PointGradient:
     """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
-    An extremum so near to a fold that it is not told from the fold moves with the fold.
+    An extremum that is too near to a fold to be told from it moves with the fold.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def difference(a: Dual, b: Dual) -> float:
 def unsure(label: str, slip: str, size: ArrayLike, unit: str) -> Judged:
     """Return a case that cannot be judged, because our scan alone may have a wrong symbol in an equation.
 
-    ``slip`` says what the scan has in the place of what is right, ``size`` is the difference that this makes.
+    ``slip`` names the wrong and the right symbol, ``size`` is the difference between their results.
     """
     most = float(np.max(np.abs(size)))
     why = f"our scan has {slip}, a difference of {most:.4g} {unit}; the printed thesis may be right (erratum 9)"

@@ -332,7 +332,7 @@ def torque_result() -> StudyResult:
 
 
 def _torques() -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, float]]:
-    """Return the crank angles (deg), the torques with the three springs, and the angles of the extremes with 1e6 dyn/cm."""
+    """Return crank angles (deg), the torques with three springs, and where that with 1e6 dyn/cm is greatest and least."""
     angle, torque = _steady(1e6).angle_deg, np.array([_steady(k).torque for k in STIFFNESSES])
     return angle, torque, {"greatest": greatest(angle, torque[1])[0], "least": least(angle, torque[1])[0]}
 

@@ -399,7 +399,7 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def flattening_damper(inertia_ratio: float, times: float) -> float:
-    """Find the omega_c (1/s) at which the peak of the first harmonic is so many times its amplitude `OUTSIDE` above it."""
+    """Find the omega_c (1/s) with which the first harmonic at its peak is ``times`` that at a speed higher by `OUTSIDE`."""
 
     def excess(omega_c: float) -> float:
         at, height = peak(1, inertia_ratio, omega_c)

@@ -207,7 +207,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
 
 
 def judge_homogeneous_part() -> tuple[Case, ...]:
-    """Judge whether the force changes the multipliers of the linear equation, as printed and right."""
+    """Judge whether the force changes the multipliers of the linear equation, both as printed and corrected."""
     region = hill_region(chapter_4(1.0))
     speed = crank_speed(0.5 * (region.low + region.high))
     return tuple(

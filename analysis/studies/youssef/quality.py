@@ -156,9 +156,9 @@ def count_late_violations() -> int:
 
 
 def share_of_values() -> float:
-    """Return how many values of (6.12) a test at 0 and 180 deg takes for the random four-bars, relative to one at all angles.
+    """Return how many values of (6.12) are computed in a test of the random four-bars at 0 and 180 deg only.
 
-    Each test of a four-bar stops at its first negative value.
+    The result is relative to a test at all crank angles. The test of a four-bar stops at the first negative value.
     """
     violated = assembly_arguments() < 0.0
     at_two, at_all = (

@@ -174,7 +174,7 @@ def spread_beyond_constant(coefficient: float) -> float:
 
 
 def slight_coefficients() -> tuple[float, float]:
-    """Return the least and the greatest coefficient that change the amplitude slightly: the most at the speeds `COMPARED`."""
+    """Return the least and the greatest friction coefficient with a slight effect on the amplitude at the speeds `COMPARED`."""
     smooth = np.array([amplitude(turn("A", w)) for w in COMPARED["A"]])
 
     def beyond(coefficient: float, part: float) -> float:

@@ -178,7 +178,7 @@ def _like_one_mass(
 def linear_motion(
     spring: str, speed: float, variant: Variant = Variant.SECOND_ORDER, harmonics: int = 2
 ) -> HarmonicMotion:
-    """Return the motion u/l4 at a speed (rpm) by the corrected linear equation of chapter IV, with so many harmonics."""
+    """Return the motion u/l4 at a speed (rpm) by the corrected linear equation of chapter IV, with ``harmonics``."""
     return harmonic_balance(slider_equation(rigs.rig(spring), speed * RAD_S_PER_RPM, variant=variant), harmonics)
 
 

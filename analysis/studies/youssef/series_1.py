@@ -199,7 +199,7 @@ def two_positions() -> StudyResult:
 
 
 def _upright_errors(rotation: FloatArray, places: ComplexArray) -> FloatArray:
-    """Return the least distance (l3) from points to P with an upright rocker, by (7.15); NaN if it cannot be assembled."""
+    """Return how close P comes to each point when the rocker is upright, by (7.15), in l3; NaN if it is out of reach."""
     pins = LINKAGE.crank_length * np.exp(1j * rotation)[:, None]
     with np.errstate(invalid="ignore"):
         arms = solve_slider_equations(rotation, places)[0] + 1j * LINKAGE.rocker_length - pins

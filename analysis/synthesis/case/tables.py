@@ -264,7 +264,7 @@ class _Curve(_ObjectiveAndRange):
         return found, closed if self.closed is None else self.closed
 
     def _timed_points(self, folder: Path, *given: Any) -> FloatArray:
-        """Return the points in m; the last point of a file, if it repeats the first, is one of them if what is given counts it.
+        """Return the points in m; if a file's last point repeats the first, it is kept only if it has a value in ``given``.
 
         ``given`` are crank rotations, as `Steps` or a list, and a list of angles; each may be None.
         """

@@ -529,9 +529,9 @@ def neglected_load(linkage: Linkage, make: MachineSpec) -> str:
 def settle_slider(
     parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
 ) -> tuple[float, float]:
-    """Return position (m) and velocity (m/s) of a slider that a run of ``duration`` (s) returns to; zeros if it has none.
+    """Find the position (m) and velocity (m/s) to which a slider returns after a run of ``duration`` (s), else zeros.
 
-    With a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
+    After a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
     is repeated at most `SETTLING` times until the slider is within a millionth of its travel. SciPy's method is used: to
     compile the solver would take longer.
     """

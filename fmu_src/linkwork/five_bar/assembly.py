@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import LIMIT_SINE, UnjoinedMessages
+from ..limits import UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import Constants, FiveBarParameters
@@ -29,14 +29,8 @@ def check_assembly(crank_angle: float, slider_position: float, p: Constants) -> 
     """
     square = kinematics.assembly_square(crank_angle, slider_position, p)
     sine = copysign(sqrt(abs(square)) / (p.l3 * p.l4), square)
-    if not sine >= LIMIT_SINE:
-        where = configuration(crank_angle, slider_position)
-        raise UNJOINED.error(sine, (crank_angle, slider_position), p, where)
-
-
-def configuration(crank_angle: float, slider_position: float) -> str:
-    """Describe a configuration in words."""
-    return f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
+    at = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
+    UNJOINED.check(sine, (crank_angle, slider_position), p, at)
 
 
 def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import LIMIT_SINE, UnjoinedMessages
+from ..limits import UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import Constants, SliderCrankParameters
@@ -19,15 +19,7 @@ UNJOINED = UnjoinedMessages(
 
 
 def check_assembly(crank_angle: float, shift: float, p: Constants) -> None:
-    """Check that the rod reaches the guide at a configuration, with a clearance of at least `LIMIT_SINE`.
-
-    Parameters
-    ----------
-    crank_angle : float
-        Crank angle theta1 (rad).
-    shift : float
-        Axial shift S1 (m).
-    p : Constants
+    """Check that the rod reaches the guide at a crank angle (rad) and shift (m), with a clearance of at least `LIMIT_SINE`.
 
     Raises
     ------
@@ -37,9 +29,8 @@ def check_assembly(crank_angle: float, shift: float, p: Constants) -> None:
     """
     square = kinematics.assembly_square(crank_angle, shift, p)
     sine = copysign(sqrt(abs(square)) / p.a2, square)
-    if not sine >= LIMIT_SINE:
-        where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
-        raise UNJOINED.error(sine, (crank_angle, shift), p, where)
+    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
+    UNJOINED.check(sine, (crank_angle, shift), p, where)
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
