@@ -282,19 +282,3 @@ class TestCommand:
         assert code in (1, 2)
         assert words in " ".join(output.split())
         assert not Path("out").exists()
-
-    @pytest.mark.parametrize(
-        ("content", "words"),
-        [
-            ("", "has no numbers"),
-            ("t,u\n", "has no numbers"),
-            ("t,u\n0,1\n0.1,high\n", "line 3, column 2: 'high' is not a finite number"),
-            ("t,u\n0,1\n0.1\n", "line 3, column 2: '' is not a finite number"),
-            ("t\n0\n1\n", "line 2, column 2: '' is not a finite number"),
-        ],
-    )
-    def test_files_that_are_no_record(self, content: str, words: str) -> None:
-        Path("record.csv").write_text(content)
-        code, output = self.run("record.csv")
-        assert code == 1
-        assert words in " ".join(output.split())

@@ -404,6 +404,9 @@ def test_blanks_around_the_name_of_a_column_do_not_count(tmp_path):
         ("0,1\n2,3\n", ("t", "x"), "has no headings, and so no column 't'"),
         ("t [s],x [mm]\ns,cm\n0,1\n", None, "line 2: the unit 'cm' is below a heading with the unit 'mm'"),
         ("t,x\nnan,nan\n0,1\n", None, "line 2, column 1: 'nan' is not a finite number"),
+        ("t,x\n0,1\n0.1,high\n", ("t", "x"), "line 3, column 2: 'high' is not a finite number"),
+        ("t,x\n0,1\n0.1\n", ("t", "x"), "line 3, column 2: '' is not a finite number"),
+        ("t\n0\n1\n", (None, None), "line 2, column 2: '' is not a finite number"),
         (
             "t x\n0 1\n2 3\n",
             None,

@@ -352,33 +352,28 @@ class TestBetween:
         over = violations(Program(normal, make_limits(task, normal, None, syn.USUAL)), start)["order of the stations"]
         assert (over > 0.0) == refused
 
-    def test_transmission_angle_on_the_way(self) -> None:
-        gap = 0.4
-        task = syn.TimedPath(points=ellipse(24)[:3], rotation=[0.0, gap, 2.0 * gap])
-        # the crank lies along the ground link in the middle between two of the quarters of a gap
+    @pytest.mark.parametrize(
+        ("rotation", "along", "off"),
+        [
+            # in the middle between two of the quarters of a gap
+            ((0.0, 0.4, 0.8), 0.25, -1e-5),
+            ((0.0, 0.4, 0.8), 0.25, 1e-5),
+            # nearer to the station than to the rotation before it; after the station steps are shorter
+            ((0.0, 1.6, 1.7), 1.46, 1e-5),
+        ],
+    )
+    def test_transmission_angle_on_the_way(self, rotation: tuple[float, ...], along: float, off: float) -> None:
+        """The crank lies along the ground link at the rotation ``along``, between two stations."""
+        task = syn.TimedPath(points=ellipse(24)[:3], rotation=rotation)
         linkage = syn.Linkage(
-            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
-            crank_phase=math.pi - 0.625 * gap,
+            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, crank_phase=math.pi - along
         )  # fmt: skip
         least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
         normal = syn.normal_form(task)
-        for off in (-1e-5, 1e-5):
-            asked = (syn.LeastTransmission(angle=least + off, over="task"), syn.LargestLink(length=1.0))
-            limits = make_limits(task, normal, None, asked)
-            over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
-            assert (over > 0.0) == (off > 0.0)
-
-    def test_transmission_angle_in_the_step_before_a_station_after_which_steps_are_shorter(self) -> None:
-        task = syn.TimedPath(points=ellipse(24)[:3], rotation=[0.0, 1.6, 1.7])
-        normal = syn.normal_form(task)
-        # the crank lies along the ground link nearer to the station than to the rotation before it
-        linkage = syn.Linkage(
-            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, crank_phase=math.pi - 1.46
-        )  # fmt: skip
-        least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
-        asked = (syn.LeastTransmission(angle=least + 1e-5, over="task"), syn.LargestLink(length=1.0))
+        asked = (syn.LeastTransmission(angle=least + off, over="task"), syn.LargestLink(length=1.0))
         limits = make_limits(task, normal, None, asked)
-        assert violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"] > 0.0
+        over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
+        assert (over > 0.0) == (off > 0.0)
 
     @pytest.mark.parametrize("judged", [False, True])
     def test_transmission_angle_over_a_turn_with_a_moved_pivot(self, judged: bool) -> None:
