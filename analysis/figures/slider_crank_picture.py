@@ -193,7 +193,7 @@ class _Scene:
         """Draw the whole mechanism at one configuration, with the paths of its pins."""
         self.lines = []
         self._centre_lines(axis, pose)
-        self._paths(axis, pose, letters)
+        self._paths(axis, letters)
         self._solids(axis, pose)
         self._dimensions(axis, pose, letters)
         if letters:
@@ -242,7 +242,7 @@ class _Scene:
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
         self._line(axis, ring + pose.centre, color="0.6", linewidth=style.THIN, linestyle=":", zorder=1)
 
-    def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
+    def _paths(self, axis: Axes, letters: bool) -> None:
         """Draw the paths of the pins, and mark dead centres and limits; with ``letters`` draw crank and rod there, too."""
         for part in self.parts:
             self._line(axis, part.crank_pins, color=style.TRACE, linewidth=style.BOLD, zorder=2)

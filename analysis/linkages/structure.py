@@ -414,7 +414,7 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
     fixed = [joint for name, joint in found.items() if name not in freed]
     step: Step | None
     while unknown := [body for body in moving if body not in known]:
-        if step := next(_gear_steps(description, fixed, known, linear, unknown), None):
+        if step := next(_gear_steps(description, fixed, linear, unknown), None):
             new = [step.body]
             linear.add(step.body)
         elif racked := next(_rack_steps(description, found, fixed, known, linear, travels), None):
@@ -465,7 +465,7 @@ def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[FreedomStep]], known
 
 
 def _gear_steps(
-    description: Description, fixed: list[Joint], known: Mapping[str, None], linear: set[str], unknown: list[str]
+    description: Description, fixed: list[Joint], linear: set[str], unknown: list[str]
 ) -> Iterator[GearStep]:
     """Yield a step for each unknown gear whose mate and carrier have angles that are linear in the coordinates."""
     pins = [joint for joint in fixed if isinstance(joint, Pin)]

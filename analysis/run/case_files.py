@@ -362,7 +362,7 @@ def _check_drives(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
         )
     modes = inputs.modes(mechanism)
-    names = {argument: name for name, (argument, _) in case_inputs(mechanism).items()}
+    names = {argument: name for name, (argument, _) in acting.items()}
     for freedom in mechanism.freedoms:
         rate = getattr(initial, freedom.initial[1])
         if freedom.mode is None or rate == 0.0:

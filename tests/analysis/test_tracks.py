@@ -96,8 +96,7 @@ def test_lanes_pass_over_no_change_point() -> None:
 @kernel(int64(SECTION, MATRIX, VECTOR, VECTOR, VECTOR), purpose="a test")
 def deflate(section: Any, known: Any, start: Any, z: Any, correction: Any) -> int:
     """Return what follows one integration from a start to z, and write the correction."""
-    hunt = kernels.make_hunt(start.shape[0])
-    kernels.begin_hunt(start, hunt)
+    hunt = kernels.make_hunt(start)
     what = kernels.continue_deflated_newton(section, 9, 1e9, DONE, known, z, hunt)
     for i in range(start.shape[0]):
         correction[i] = hunt.correction[i]

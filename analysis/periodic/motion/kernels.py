@@ -248,8 +248,9 @@ def advance(section, begin, end, z, room, carry):
 
 
 @inner
-def start_piece(n, start, z):
+def start_piece(start, z):
     """Write the initial values of a piece of the period into z: y = ``start``, dy/dy0 the identity, dy/dlambda zero."""
+    n = start.shape[0]
     for i in range(z.shape[0]):
         z[i] = 0.0
     for i in range(n):
@@ -363,14 +364,6 @@ class Hunt(NamedTuple):
     numbers: NDArray[np.float64]  # see the indices above
 
 
-@part
-def make_hunt(n):
-    """Return an empty state of a search for y of n components."""
-    return Hunt(
-        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, n + 1)), np.zeros(n * (1 + n)), np.zeros(4)
-    )
-
-
 @inner
 def begin_hunt(start, hunt):
     """Begin a search: ``start`` becomes the start of the first integration."""
@@ -378,6 +371,17 @@ def begin_hunt(start, hunt):
     copy(start, hunt.trial)
     hunt.numbers[_ITERATION], hunt.numbers[_FRACTION] = 0.0, 1.0
     hunt.numbers[_SIZE], hunt.numbers[_RESIDUAL] = 0.0, np.inf
+
+
+@part
+def make_hunt(start):
+    """Return the state of a search that begins at ``start``, y of n components."""
+    n = start.shape[0]
+    hunt = Hunt(
+        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, n + 1)), np.zeros(n * (1 + n)), np.zeros(4)
+    )
+    begin_hunt(start, hunt)
+    return hunt
 
 
 @inner
@@ -479,12 +483,10 @@ def newton(section, end, most, start, z, room, carry, report):
 
     Parameters and result are those of `solve`; ``room`` and ``carry`` are those of `advance`.
     """
-    n = section.scale.shape[0]
-    hunt = make_hunt(n)
-    begin_hunt(start, hunt)
+    hunt = make_hunt(start)
     what = GOING
     while what == GOING:
-        start_piece(n, hunt.trial, z)
+        start_piece(hunt.trial, z)
         what = continue_newton(section, most, advance(section, 0.0, end, z, room, carry), z, hunt)
     copy(hunt.start, start)
     report[0], report[1] = hunt.numbers[_RESIDUAL], hunt.numbers[_ITERATION]
@@ -527,12 +529,10 @@ def deflated_newton(section, end, most, reach, start, known, z, room, carry):
 
     Parameters and result are those of `search`; ``room`` and ``carry`` are those of `advance`.
     """
-    n = section.scale.shape[0]
-    hunt = make_hunt(n)
-    begin_hunt(start, hunt)
+    hunt = make_hunt(start)
     what = GOING
     while what == GOING:
-        start_piece(n, hunt.trial, z)
+        start_piece(hunt.trial, z)
         status = advance(section, 0.0, end, z, room, carry)
         what = continue_deflated_newton(section, most, reach, status, known, z, hunt)
     copy(hunt.start, start)
@@ -661,7 +661,7 @@ def segments(section, angles, starts, rows):
     room = make_room(section, rows.shape[1] // starts.shape[1] - 1)
     carry = np.array([0.1, 0.0])
     for piece in range(starts.shape[0]):
-        start_piece(starts.shape[1], starts[piece], rows[piece])
+        start_piece(starts[piece], rows[piece])
         status = advance(section, angles[piece], angles[piece + 1], rows[piece], room, carry)
         if status != DONE:
             return status

@@ -101,7 +101,7 @@ def begin(lane, section, start, end, tolerance, v):
     Mechanism and drive of the section must be those of the lane: see `set_mechanism`.
     """
     n = start.shape[0]
-    start_piece(n, start, v.z)
+    start_piece(start, v.z)
     write_lane(lane, LANES, v.z, v.x)
     v.angle[lane], v.end[lane], v.tolerance[lane], v.count[lane] = 0.0, end, tolerance, 0.0
     v.slowest[lane] = STALL * start[n - 1] if section.torque else 0.0
