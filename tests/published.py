@@ -86,8 +86,8 @@ HALF_NATURAL_FREQUENCY_RAD_S = 25.55
 TORQUE_TIME_EXPONENT = -1.95
 
 # --- Errors of the source in chapters II and III
-# appendix 1, KINE: its "+ root" changes assembly once B passes D and divides by zero with B vertically above D: see
-# tests/plant/test_kinematics.py
+# appendix 1, KINE: its "+ root" changes assembly once B passes D and divides by zero with B vertically above or below D:
+# see tests/plant/test_kinematics.py
 # appendix 1, FY45: the weight of the rocker enters the vertical force with the wrong sign: see tests/plant/test_dynamics.py
 
 # --- Chapters IV and V: massless coupler, rocker's centre of mass on the slider pin, l3 = l4 = l1, horizontal; omega_c is

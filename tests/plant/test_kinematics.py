@@ -227,11 +227,12 @@ def kine_plus_root(th2: float, u: float, p: Constants) -> tuple[float, float]:
     return (a - y * dy) / dx, y
 
 
-def test_plus_root_of_the_listing_changes_assembly_where_b_passes_d() -> None:
-    # the slider moves until D is to the left of B, which stays above it
+@pytest.mark.parametrize("angle", [50.0, -50.0])
+def test_plus_root_of_the_listing_changes_assembly_where_b_passes_d(angle: float) -> None:
+    # the slider moves until D is to the left of B, which stays above it or below it
     p = TABLE_3_1.constants()
-    th2 = radians(50.0)
-    over = p.l2 * cos(th2) - p.l1  # the slider position with B vertically above D
+    th2 = radians(angle)
+    over = p.l2 * cos(th2) - p.l1  # the slider position with B vertically above or below D
     for u in (over + 1e-3, over + 1e-6):
         g = K.position(th2, u, p)
         assert kine_plus_root(th2, u, p) == pytest.approx((p.l3 * g.c3, p.l3 * g.s3), abs=1e-9)
@@ -241,6 +242,6 @@ def test_plus_root_of_the_listing_changes_assembly_where_b_passes_d() -> None:
         assert hypot(x, y) == pytest.approx(p.l3, rel=1e-6)  # a position of the links it is
         assert abs(complex(x - p.l3 * g.c3, y - p.l3 * g.s3)) > p.l3  # the other one
         assert g.s43 > 0.0
-    # vertically above, where the listing divides by zero, nothing special happens
+    # there, where the listing divides by zero, nothing special happens
     before, at, after = (K.position(th2, over + h, p) for h in (-1e-7, 0.0, 1e-7))
     assert at == pytest.approx([0.5 * (x + y) for x, y in zip(before, after)], abs=1e-11)

@@ -490,7 +490,8 @@ def _slider_force(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "very close to zero, while running the program.",
             text("section 2.8, eq 69h, L995"),
             f"greatest 2F2i by eq 69h at the half degrees of the crank at which theta2 is within {VERY_CLOSE_DEG:g} deg of "
-            f"0, relative to the greatest {FROM_DEAD}; in the plane, a4 = 10 in, with errata 5 and 6 mended",
+            f"0, relative to the greatest at the whole degrees that are {FROM_DEAD}; in the plane, a4 = 10 in, with errata 5 "
+            "and 6 mended",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*",
             (at_least("2F2i", ABNORMAL, high),),
             "but this outcome is right: the force that a given torque causes is infinite there",
