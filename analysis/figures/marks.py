@@ -19,7 +19,7 @@ from .style import HAIR, MARK, MARKED, TINY, Figure
 
 #: Matplotlib's gid of vertical lines and their names, and of the texts of points.
 _GID, _LABEL = "mark", "label"
-#: Look of both, whose places are offsets from what they name.
+#: Look of these texts; their positions are offsets from the line or point that they name.
 _TEXT: dict[str, Any] = {"textcoords": "offset points", "fontsize": TINY, "color": MARKED}
 #: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0

@@ -60,7 +60,7 @@ EVERY = np.unique(np.append(np.arange(9.0, 40.05, 0.1), AT_PEAKS).round(3))
 #: Amplitude above which a speed lies in the region of resonance, and distance (rad/s) from the peak beyond which it lies
 #: outside this region: our choice.
 LARGE, OUTSIDE = 0.1, 3.0
-#: Peaks of the first harmonic, relative to its amplitude `OUTSIDE` above them, to which a damper is to limit them.
+#: Peaks to which dampers limit the first harmonic, relative to its amplitude at a speed higher by `OUTSIDE`.
 TIMES = (1.5, 2.0, 5.0)
 #: Half the step in speed (rad/s) of appendix 2, to which its output locates a resonance.
 HALF_STEP = 0.05
