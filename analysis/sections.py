@@ -33,7 +33,7 @@ def density(value: Amount, name: str = "density") -> float:
     ParameterError
         If the value is neither a positive density nor a known material.
     """
-    if value in DENSITIES:
+    if isinstance(value, str) and value in DENSITIES:
         return DENSITIES[value]
     if isinstance(value, str) and not any(c.isdigit() for c in value):
         raise ParameterError(name, value, f"be one of {', '.join(DENSITIES)}, or a density such as '7.85 g/cm3'")

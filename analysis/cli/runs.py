@@ -148,7 +148,7 @@ def _print_extremes(title: str, result: Any) -> None:
         unit, factor = display_scale(si)
         digits = 2 if name in residuals else 6
         numbers = [
-            f"{factor * v if abs(v) > _ROUNDING * largest[si] else 0.0:.{digits}g}" for v in (x.min(), x.max(), x[-1])
+            f"{0.0 if abs(v) <= _ROUNDING * largest[si] else factor * v:.{digits}g}" for v in (x.min(), x.max(), x[-1])
         ]
         varies = x.max() - x.min() > _ROUNDING * largest[si]
         least, greatest = (place(x.argmin()), place(x.argmax())) if varies else ("", "")

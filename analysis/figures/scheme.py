@@ -60,7 +60,8 @@ def draw(
     assert drawing is not None
     now = {name: path[0] for name, path in positions.items()}
     everything = np.concatenate(list(positions.values()))
-    unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0)))
+    # a rotor has all its joints in one place
+    unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0))) or 1.0
     for name in drawing.paths:
         axis.plot(*positions[name][1:].T, color=style.TRACE, linewidth=style.THIN, zorder=2)
     taken = {style.TRACE, *(_NAMED[part.text] for part in drawing.parts if part.text in _NAMED)}

@@ -102,10 +102,17 @@ def _gears(d: Description, owners: Mapping[str, set[str]]) -> Found:
     for name, gear in d.gears.items():
         if gear.bodies[0] == gear.bodies[1]:
             yield f"gears.{name}.bodies", f"are {gear.bodies[0]} twice", "they must be two"
+        pair = " and ".join(gear.bodies)
         carriers = [set().union(*(of for of in owners.values() if body in of)) for body in gear.bodies]
-        if set(gear.bodies) <= d.bodies.keys() and not carriers[0] & carriers[1] - set(gear.bodies):
-            pair = " and ".join(gear.bodies)
+        shared = carriers[0] & carriers[1] - set(gear.bodies)
+        if set(gear.bodies) <= d.bodies.keys() and not shared:
             yield f"gears.{name}.bodies", f"are {pair}", "they must be pinned to the ground or to one third body"
+        for carrier in sorted(shared):
+            points = d.ground if carrier == GROUND else d.bodies[carrier].all_points
+            axes = [{points[own] for own, of in owners.items() if {body, carrier} <= of} for body in gear.bodies]
+            if axes[0] & axes[1]:
+                right = "teeth need two axes; a countershaft on an axis of its own, with two pairs of gears, joins such shafts"
+                yield f"gears.{name}.bodies", f"are {pair}, on one axis of the {carrier}", right
         if gear.ratio == 0.0:
             yield f"gears.{name}.ratio", "is 0", "it must not be zero"
     for name, rack in d.racks.items():

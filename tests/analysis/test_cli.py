@@ -131,6 +131,29 @@ def test_the_table_of_a_run_says_where_the_extremes_are(linkwork, tmp_path):
     assert float(place(force.argmax())) == pytest.approx(run.time[force.argmax()], rel=1e-3)
 
 
+GEARS = """
+[linkage]
+name = "pair-of-gears"
+ground = { A = [0, 0], E = [0.1, 0] }
+bodies.one = { points = { A = [0, 0] }, mass = 1.0, inertia = 0.01 }
+bodies.two = { points = { E = [0, 0] }, mass = 1.0, inertia = 0.01 }
+gears.teeth = { bodies = ["one", "two"], ratio = -2.0 }
+freedoms.one = "A"
+[drive]
+torque = 1.0
+[run]
+stop_time = 0.01
+"""
+
+
+def test_the_table_of_a_run_shows_what_is_no_number(linkwork, tmp_path):
+    """The force between gears whose axes coincide, not 0 N; the torque over the inertia is 1/(0.01 + 4 0.01)."""
+    (tmp_path / "gears.toml").write_text(GEARS)
+    found = cells(linkwork("run", "gears.toml", "--no-plot", "--set", "ground.E_x=0").output)
+    assert [found["teeth.fy"][k] for k in (1, 3, 5)] == ["nan"] * 3
+    assert [found["one.acceleration"][k] for k in (1, 3, 5)] == ["20"] * 3
+
+
 def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_path):
     result = linkwork(
         "run", "--published", "table-3.1", "--set", "slider.stiffness=0", "--set", "slider.damping=10", "--stop-time", "3 s",

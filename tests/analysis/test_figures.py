@@ -24,6 +24,7 @@ from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
 from analysis.figures.style import GROUND
 from analysis.files import WritingError, save_figure
+from analysis.linkages import linkage
 from analysis.mechanisms import MECHANISMS
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -302,6 +303,14 @@ def test_a_scheme_has_spring_and_damper_and_a_wall_that_the_slider_does_not_reac
     assert np.diff(count).tolist() == [2, 5]
     assert walls == pytest.approx([walls[0]] * 3)
     assert walls[0] > positions["D"][:, 0].max() + 0.1 * np.ptp(positions["B"], axis=0).max()
+
+
+def test_a_rotor_alone_is_drawn_though_all_its_joints_are_in_one_place() -> None:
+    rotor = linkage("rotor-alone", ground={"A": (0, 0)}).body("drum", points={"A": (0, 0)}, mass=1.0, inertia=0.01)
+    parameters = rotor.freedom("drum", "A", speed=10.0).mechanism().first_set.parameters
+    figure = figures.plot(simulate(parameters, Inputs(speed=10.0), stop_time=0.1, step=0.01))
+    widths = [np.ptp(patch.get_path().vertices[:, 0]) for axis in figure.axes for patch in axis.patches]
+    assert min(widths) > 0.0
 
 
 def test_animation(run, tmp_path: Path) -> None:

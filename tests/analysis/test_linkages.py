@@ -1169,6 +1169,13 @@ def toothed_rocker() -> Any:
     return built.gear("Z", bodies=("rocker", "pinion"), ratio=-2.0).freedom("crank", "A")
 
 
+def gears_on_one_axis() -> Any:
+    built = linkage("coaxial", ground={"A": (0, 0), "E": (0, 0)})
+    built.body("shaft", points={"A": (0, 0)}, mass=1.0, inertia=0.01)
+    built.body("sleeve", points={"E": (0, 0)}, mass=1.0, inertia=0.01).freedom("shaft", "A")
+    return built.gear("Z", bodies=("shaft", "sleeve"), ratio=-2.0)
+
+
 def rubbed_pin() -> Any:
     built = linkage("rubbed", ground={"A": (0, 0), "D": (0.15, 0), "H": (0.3, 0)}, friction={"B2": "1 mm"})
     built.body("crank", bar=("A", "B"), length=0.05).body("rocker", bar=("D", "C"), length=0.12, mass=1.0)
@@ -1216,6 +1223,7 @@ REFUSED = [
     (spring_without_length, r"the length of linkage\.springs\.k, which has no direction at 0 m"),
     (lambda: wheel("twice", damping=1.0, more={"torques": ["pendulum"]}), r"two inputs would be called pendulum\.torque"),
     (toothed_rocker, r"by linkage\.gears\.Z pinion meshes with rocker, whose angle must follow"),
+    (gears_on_one_axis, r"linkage\.gears\.Z\.bodies are shaft and sleeve, on one axis of the ground: teeth need two axes"),
     (rubbed_pin, "B is of crank, coupler, other: give the other a point of its own at the same"),
     (rubbed_slot, "of two bodies: A, D, S; the friction of the pin B is that of its slot S"),
     (folded_slot, r"linkage\.slots\.S has no direction at the start: the pins . and . are at one"),

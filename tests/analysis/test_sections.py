@@ -79,3 +79,5 @@ def test_what_is_no_section_is_refused(make: object, said: str) -> None:
 
 def test_densities_are_read_with_their_units() -> None:
     assert density("7.85 g/cm3") == pytest.approx(DENSITIES["steel"])
+    with pytest.raises(ParameterError, match=r"material is \['steel'\]: it must be a number in kg/m3"):
+        density(["steel"], "material")  # type: ignore[arg-type]
