@@ -273,6 +273,7 @@ def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1] * 4, None, "does not turn"),
         ([[0, 0], [1, 0], [0, 0], [3, 1], [4, 0]], [0.1, 0.2, 0.1, 0.4, 0.5], None, "the same"),
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "give poses without"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.0, 1e-5, 3e-5, 4e-5], None, "a slide is in its place"),
     ],
 )
 def test_poses_that_cannot_be_taken(points: object, angle: object, rotation: object, said: str) -> None:
@@ -358,6 +359,28 @@ def test_a_rocker_that_turns_with_the_crank_is_that_of_every_parallelogram(step,
     task = syn.RockerFunction(angle=1.0 + rotation, rotation=rotation, mounting=mounting)
     with pytest.raises(InputError, match="points of the function are not independent"):
         syn.function_generators(task, crank_phase=crank_phase)
+
+
+@pytest.mark.parametrize("ratio", [-1.0, 0.5, 2.0])
+def test_a_rocker_at_a_constant_ratio_of_the_crank_has_no_linkage_at_five_points(ratio: float) -> None:
+    """All dyads of its poses are the ground link itself, or slides."""
+    rotation = np.array([0.0, 0.3, 0.5, 0.8, 1.2])
+    task = syn.RockerFunction(angle=1.0 + ratio * rotation, rotation=rotation, mounting=True)
+    assert syn.function_generators(task).solutions == ()
+
+
+@pytest.mark.parametrize(("mounting", "crank_phase"), [(False, None), (True, 0.4)])
+def test_a_rocker_that_turns_against_the_crank_has_a_linkage_at_four_points(
+    mounting: bool, crank_phase: float | None
+) -> None:
+    """At one of the two angles at which the determinant is zero, crank and rocker mirror each other, and no links do it."""
+    rotation = np.array([0.0, 0.4, 0.7, 1.0])
+    task = syn.RockerFunction(angle=1.0 - rotation, rotation=rotation, mounting=mounting)
+    (found,) = syn.function_generators(task, crank_phase=crank_phase).solutions
+    l = found.linkage  # noqa: E741
+    b = l.crank_length * np.exp(1j * (rotation + l.crank_phase))
+    c = l.ground_length + l.rocker_length * np.exp(1j * (1.0 - rotation - l.output_angle))
+    assert np.abs(c - b) == pytest.approx(np.full(4, l.coupler_length), rel=1e-9)
 
 
 def test_chebyshev_spacing() -> None:

@@ -38,6 +38,8 @@ INDEPENDENT = 1e-10
 REAL = 1e-7
 #: Distance, in units of the poses' size, beyond which an end of a dyad counts as infinite: a slide is in its place.
 FAR = 1e3
+#: Distance, in the same units, up to which two places count as one: the roots of a multiple dyad differ by rounding.
+SAME = 1e-5
 #: Number of lines through a pole that sample the curve of four poses: each meets the curve in two further points.
 CURVE_POINTS = 180
 #: Greatest length of links in the map of four poses, in units of the poses' size; the same as in a search without bounds.
@@ -343,7 +345,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
     made = [
         build_four_bar(task, a, b)
         for a, b in permutations(dyads, 2)
-        if min(abs(a.pivot - b.pivot), abs(a.point - b.point), a.length, b.length) > REAL * unit
+        if min(abs(a.pivot - b.pivot), abs(a.point - b.point), a.length, b.length) > SAME * unit
     ]
     return Guidance(
         task=task,
@@ -472,6 +474,11 @@ def _pivot_line(row: FloatArray, z: complex) -> FloatArray:
 def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> GuidanceMap:
     unit = normal_form(task).unit
     z, m = dyads_of_four(p / unit, angle)
+    if not len(z):
+        raise InputError(
+            f"each link that guides the body through these poses has an end more than {FAR:g} times their size away, as if the "
+            "body hardly turns; a slide is in its place: turn the body farther, or change a pose"
+        )
     sound, transmission = _check_pairs(p / unit - p[0] / unit, np.exp(1j * (angle - angle[0])), z, m)
     pivots, points = p[0] + unit * m, p[0] + unit * z
     chosen: list[tuple[int, int]] = []

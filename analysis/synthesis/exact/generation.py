@@ -46,7 +46,7 @@ from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission, crank_advance
 from ..task.limits import GROUND, LARGEST, check_bounds, check_greatest_length, check_sequence, complete_bounds
 from ..task.task import PrecisionPoints, RockerFunction, SliderFunction, Task, TimedPath, UntimedPath, turn
-from .burmester import INDEPENDENT, Exact, dyads_of_five, exact_solution, pinned_four_bar, real_dyads
+from .burmester import INDEPENDENT, SAME, Exact, dyads_of_five, exact_solution, pinned_four_bar, real_dyads
 
 FloatArray = NDArray[np.float64]
 #: Lengths of crank, coupler and rocker in units of the ground link; crank phase and mounting angle of the output (rad).
@@ -159,15 +159,18 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
 
 
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
-    """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if no real links exist.
+    """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if there are no such links.
 
     A link of negative length points in the opposite direction: its length becomes positive, and its angle changes by pi.
 
     Raises InputError if the points leave infinitely many linkages.
     """
     rows = _rows(th2, th4)
-    scale = np.linalg.svd(rows[:, :3], compute_uv=False)
-    if scale[-1] < INDEPENDENT * scale[0]:
+    scales = [np.linalg.svd(one, compute_uv=False) for one in (rows[:, :3], rows)]
+    of_links, of_all = (int((scale > INDEPENDENT * scale[0]).sum()) for scale in scales)
+    if of_links < min(of_all, 3):
+        return None  # the points contradict one another
+    if of_links < 3:
         raise InputError(_DEPENDENT_POINTS)
     r1, r2, r3 = np.linalg.lstsq(rows[:, :3], -rows[:, 3], rcond=None)[0].tolist()
     if min(abs(r1), abs(r2)) < INDEPENDENT:
@@ -199,7 +202,8 @@ def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
     real, _ = real_dyads(*parts)
     z, m = (part[real].real @ np.array([1.0, 1j]) for part in parts)
     m = places[0] + m
-    there = np.arange(len(z)) != np.argmin(np.abs(z) + np.abs(m))
+    # all four dyads may be the ground link, as for a rocker that turns as the crank does, but the other way
+    there = np.abs(z) + np.abs(m) > SAME
     return [
         (abs(b), abs(places[0] + c - b), abs(c), float(np.angle(b)), float(psi[0] - phi[0] - np.angle(c)))
         for b, c in zip(m[there], z[there])
