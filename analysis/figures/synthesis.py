@@ -201,17 +201,39 @@ def _plot_magnified_errors(axis: Axes, scene: syn.LinkageScene) -> None:
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
-def _plot_rocker(axis: Axes, scene: syn.LinkageScene) -> None:
-    """Plot the rocker angle over the crank rotation with its target."""
+def _function_scale(scene: syn.LinkageScene) -> tuple[str, str, float]:
+    """Return the heading of a function's values in `LinkageScene.stations`, the label of their axis and its factor from SI."""
+    if scene.target is None:
+        return "target angle [rad]", "rocker angle [deg]", float(np.degrees(1.0))
+    return "target x [m]", "slider position x [mm]", MM_PER_METRE
+
+
+def _plot_function(axis: Axes, scene: syn.LinkageScene) -> None:
+    """Plot the rocker's angle or the slider's position over the crank rotation with its target."""
     assert scene.function is not None
-    columns = scene.stations
-    x = np.degrees(columns["crank rotation [rad]"])
-    axis.plot(*np.degrees(scene.function), color=style.ROCKER, label="rocker", zorder=4)
+    heading, label, factor = _function_scale(scene)
+    turns, values = np.degrees(scene.function[0]), factor * scene.function[1]
+    colour = style.ROCKER if scene.target is None else style.SLIDER
+    axis.plot(turns, values, color=colour, linewidth=style.THIN, alpha=0.5)
+    axis.plot(
+        turns,
+        np.where(_within_task(scene, turns), values, np.nan),
+        color=colour,
+        label=label.partition(" ")[0],
+        zorder=4,
+    )
     look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": style.THIN}
-    axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=style.TARGET, label="target", zorder=3, **look)
+    x = np.degrees(scene.stations["crank rotation [rad]"])
+    axis.plot(x, factor * scene.stations[heading], "o", color=style.TARGET, label="target", zorder=5, **look)
     axis.set_xlabel("crank rotation [deg]")
-    axis.set_ylabel("rocker angle [deg]")
+    axis.set_ylabel(label)
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
+
+
+def _within_task(scene: syn.LinkageScene, turns: FloatArray) -> NDArray[np.bool_]:
+    """Return which crank rotations (deg) the task uses."""
+    begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
+    return np.asarray((turns >= begin - 1e-9) & (turns <= end + 1e-9))
 
 
 def _is_met(scene: syn.LinkageScene) -> bool:
@@ -251,10 +273,8 @@ def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the transmission angle over a crank turn; the part of the turn that the task uses is a thick line."""
     rotation, angle = scene.transmission
     turns, angles = np.degrees(rotation), np.degrees(angle)
-    begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
-    within = (turns >= begin - 1e-9) & (turns <= end + 1e-9)
     axis.plot(turns, angles, color=style.COUPLER, linewidth=style.THIN, alpha=0.5)
-    axis.plot(turns, np.where(within, angles, np.nan), color=style.COUPLER, linewidth=style.BOLD)
+    axis.plot(turns, np.where(_within_task(scene, turns), angles, np.nan), color=style.COUPLER, linewidth=style.BOLD)
     axis.axhline(90.0, color="0.6", linewidth=style.HAIR)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
@@ -289,9 +309,9 @@ def _draw_panel(axis: Axes, scene: syn.LinkageScene, *, size: float, letters: bo
 
 
 def _plot_task(axis: Axes, scene: syn.LinkageScene) -> None:
-    """Plot target and result of the task: the rocker function, or the path with magnified errors."""
+    """Plot target and result of the task: the function, or the path with magnified errors."""
     if scene.function is not None:
-        _plot_rocker(axis, scene)
+        _plot_function(axis, scene)
     else:
         _plot_magnified_errors(axis, scene)
 
@@ -460,8 +480,8 @@ def animate_solution(
 ) -> Path:
     """Write a GIF of the linkage over a crank turn, with the transmission angle below it.
 
-    For a rocker function, the rocker angle with its target is plotted instead of the transmission angle. Positions at which the
-    links cannot be joined are left out.
+    For a function, the rocker's angle or the slider's position with its target is plotted instead of the transmission angle.
+    Positions at which the links cannot be joined are left out.
 
     Raises
     ------
@@ -479,11 +499,12 @@ def animate_solution(
     figure = Figure(figsize=(5.4, tall + 2.1))
     above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
     style.write_title(figure, scene.title)
-    drawn, plot_below = (
-        (scene.transmission, _plot_transmission) if scene.function is None else (scene.function, _plot_rocker)
-    )
-    plot_below(below, scene)
-    x, y = np.degrees(drawn)
+    if scene.function is None:
+        _plot_transmission(below, scene)
+        x, y = np.degrees(scene.transmission)
+    else:
+        _plot_function(below, scene)
+        x, y = np.degrees(scene.function[0]), _function_scale(scene)[2] * scene.function[1]
     (now,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=6)
     trace: list[FloatArray] = []
     _set_one_scale(above, frame.low, frame.high)

@@ -123,6 +123,26 @@ def test_a_function_of_the_rocker_is_shown_with_its_target() -> None:
     assert "P" not in {text.get_text() for text in figure.axes[0].texts}
 
 
+def test_a_function_of_the_slider_is_shown_over_the_crank_rotation(tmp_path: Path) -> None:
+    """With the slider's position where the task has its zero."""
+    made = syn.SliderCrank(
+        pivot_x=-0.1, pivot_y=0.02, ground_length=0.02, crank_length=0.05, coupler_length=0.17, point_distance=0.17,
+        ground_angle=-0.5 * pi, crank_phase=0.2,
+    )  # fmt: skip
+    at = np.radians([0.0, 30.0, 60.0, 90.0])
+    position = made.path(at)[:, 0] + [1e-3, -1e-3, 2e-3, 0.0]
+    solution = syn.Solution.from_linkage(syn.SliderFunction(position=position, rotation=at), made)
+    figure = figures.plot(solution)
+    panel = axis_of(figure, "slider position x")
+    np.testing.assert_allclose(drawn(panel, "target"), np.column_stack([np.degrees(at), 1e3 * position]))
+    x, y = drawn(panel, "slider").T
+    np.testing.assert_allclose(x[np.isfinite(y)][[0, -1]], [0.0, 90.0], atol=0.5)
+    np.testing.assert_allclose(y[np.isfinite(y)], 1e3 * made.path(np.radians(x[np.isfinite(y)]))[:, 0], atol=1e-9)
+    assert sum("position" in axis.get_ylabel() for axis in figure.axes) == 1
+    assert "C lies to the left of B, seen along ground_angle" in syn.report(solution)
+    assert figures.animate(solution, tmp_path / "slider.gif", frames=3).exists()
+
+
 @pytest.mark.parametrize(("linkage", "label"), [(SLIDING, "slider position [mm]"), (GEARED, "second crank [deg]")])
 def test_a_moved_pivot_is_drawn_and_its_motion_shown(linkage, label) -> None:
     figure = figures.plot(timed(linkage))

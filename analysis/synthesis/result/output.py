@@ -22,7 +22,7 @@ from ...run import Inputs, parameter_tables, simulate
 from ...units import with_unit
 from ..linkage.linkage import FiveBar, Linkage, SecondCrank, SliderCrank, SliderMotion, format_ratio
 from ..linkage.machine import MachineSpec, is_on_line, link_mass_properties
-from ..task.task import UntimedPath
+from ..task.task import SliderFunction, UntimedPath
 from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
 FloatArray = NDArray[np.float64]
@@ -129,7 +129,12 @@ class LinkageScene:
 
     @cached_property
     def function(self) -> FloatArray | None:
-        """Return crank rotations and rocker angles over a rocker function, shape (2, n); None for any other task."""
+        """Return crank rotations and values of a function, shape (2, n); None for any other task.
+
+        The values are the rocker's angles over the task (rad), or the slider's positions along x over a turn (m).
+        """
+        if self._of_slider:
+            return np.vstack([self.turn, self.linkage.path(self.turn)[:, 0]])
         if self.target is not None:
             return None
         at, turned = self.task_rotations, self.linkage.rocker_angle(self.task_rotations)
@@ -176,8 +181,17 @@ class LinkageScene:
         return np.vstack([self.turn, angle_at_c(self.linkage, self.turn)])
 
     @property
+    def _of_slider(self) -> bool:
+        return isinstance(self.solution.task, SliderFunction)
+
+    @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """Return a heading, and the position of second crank or slider at each `turn` rotation; None if there is neither."""
+        """Return a heading, and the position of second crank or slider at each `turn` rotation.
+
+        The result is None if there is neither, or the slider's position is `function`.
+        """
+        if self._of_slider:
+            return None
         if isinstance(self.linkage, FiveBar):
             return "second crank [rad]", self.linkage.pivot.angle(self.turn)
         slider = self.linkage.slider(self.turn)

@@ -455,11 +455,12 @@ class Assessment:
         solution, linkage = self.solution, self.solution.linkage
         task, pivot = solution.task, linkage.pivot
         error, rms, worst = quality_cells(solution, digits=6)
+        seen = "B, seen along ground_angle" if isinstance(linkage, SliderCrank) else "B -> D"
         head = (
             f"{solution.verdicts}\n"
             f"{quality_name(task)}: {error} {quality_unit(task)[1]}; "
             f"rms error {rms} {error_unit(task)[1]}, worst {worst} {error_unit(task)[1]}\n"
-            f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
+            f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of {seen}; "
             f"largest link {1e3 * solution.largest_link:.6g} mm"
         )
         if pivot is None:
