@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from analysis import find_orbit
-from analysis.linkages import load_linkage
+from analysis.linkages import linkage, load_linkage
 from analysis.numerics.vectors import LANES
-from analysis.periodic import Drive, OrbitError, newton_orbit
+from analysis.periodic import Drive, OrbitError, grid, newton_orbit, plane
 from analysis.periodic.motion import collocation
 from analysis.periodic.motion.discretisation import Discretisation, can_collocate
+from analysis.periodic.motion.kernels import Status
 from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
 
@@ -20,10 +21,10 @@ LINKAGES = Path(__file__).parents[2] / "examples" / "linkages"
 SMOOTH = SETS["rig-2-spring-c"].parameters
 
 
-@pytest.mark.parametrize("linkage", [None, "elastic-bearing"], ids=["five-bar", "two free freedoms"])
-def test_a_neighbour_followed_by_collocation_is_the_integrator_s(linkage: str | None) -> None:
+@pytest.mark.parametrize("example", [None, "elastic-bearing"], ids=["five-bar", "two free freedoms"])
+def test_a_neighbour_followed_by_collocation_is_the_integrator_s(example: str | None) -> None:
     """Ends, their derivatives by the beginnings and by the speed, from one speed to the next, in two pieces."""
-    known = SMOOTH if linkage is None else load_linkage(LINKAGES / f"{linkage}.toml").first_set.parameters
+    known = SMOOTH if example is None else load_linkage(LINKAGES / f"{example}.toml").first_set.parameters
     family = Family(parameters=known, drive=Drive(speed=30.0))
     angles = np.array([0.0, pi, 2.0 * pi])
     path = Discretisation(angles, True)
@@ -72,6 +73,30 @@ def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() ->
     direction = family.direction(30.0, 30.0, 31.0)
     found = path.ends(orbit.point, orbit.start[None, :], 30.0, direction, 1.0)
     assert found.clearance == pytest.approx(orbit.clearance(), rel=1e-2)
+
+
+def test_links_that_do_not_reach_between_the_nodes_are_no_motion_of_a_chart(tmp_path: Path) -> None:
+    """Two links without mass reach a shaken carriage up to a travel, closed form, which is exceeded by 0.04 % between nodes."""
+    mass, stiffness, damping, unbalance, reach = 2.0, 1800.0, 4.0, 0.01, 0.0101
+    lag = np.arctan2(damping * 24.6, stiffness - mass * 24.6**2)
+    built = linkage("reach", ground={"O": (0, 0), "D": (-0.2, 0)}, assembly={"E": 1})
+    built.body("carriage", points={"P": (0, 0), "Q": (0, 0)}, mass=1.0)
+    # the travel is greatest in the middle of the first element
+    cog = (unbalance * np.cos(pi / 8 - lag), -unbalance * np.sin(pi / 8 - lag))
+    built.body("rotor", bar=("P", "T"), length=0.05, mass=1.0, cog=cog, inertia=1e-3)
+    for name, pin in (("left", "D"), ("right", "Q")):
+        built.body(name, bar=(pin, "E"), length=0.5 * (0.2 + reach), mass=0, cog=(0, 0), inertia=0)
+    built.slide("rail", body="carriage", through="O").spring("spring", at="rail", stiffness=1800.0, damping=4.0)
+    rig = built.freedom("rotor", "P", speed=20.0).freedom("across", "rail").mechanism().first_set.parameters
+    # travel^2 (stiffness - mass w^2)^2 + (travel damping w)^2 = (unbalance w^2)^2
+    travel = reach * np.array([0.996, 0.998, 1.0004])
+    sizes = [
+        np.roots([(t * mass) ** 2 - unbalance**2, t**2 * (damping**2 - 2.0 * mass * stiffness), (t * stiffness) ** 2])
+        for t in travel
+    ]
+    speeds = np.sqrt([min(size) for size in sizes])
+    found = grid(plane(rig, Drive(speed=20.0), "drive.speed", "spring.damping"), speeds, [4.0], folder=tmp_path)
+    assert found.status.tolist() == [[Status.DONE, Status.DONE, Status.LIMIT]]
 
 
 def test_friction_and_torques_are_left_to_the_integrator() -> None:

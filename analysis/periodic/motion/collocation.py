@@ -46,6 +46,10 @@ TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
 #: Greatest size of the highest Legendre coefficients, relative to the square root of the integrator's tolerance: the error at
 #: the ends of the elements is about the square of that size.
 DECAY = 200.0
+#: Half the widest distance of two nodes on an element of length 1. At the nodes the clearance to the limit of assembly must
+#: exceed it, times the length of the elements (rad): between them the clearance is then above zero, if it changes by 1 per
+#: radian at most.
+BETWEEN = 0.5 * float(np.diff(C).max())
 #: Greatest number of corrections, and greatest size of the first correction relative to the scale: a larger one means that the
 #: motion is not a neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
@@ -448,10 +452,10 @@ def _least_gap(section, y, w, desk):
 
 @part
 def close(section, m, y, w, desk):
-    """Find y and w of a periodic motion on m elements by Newton's method; the arrays y and w are in lanes.
+    """Find y and w of a periodic motion on m equal elements by Newton's method; the arrays y and w are in lanes.
 
     Return a `Status` and the relative size of the highest Legendre coefficients. NO_STEP means that this size is too large:
-    more elements are needed.
+    more elements are needed. LIMIT means that the limit of assembly may lie between the nodes: shooting must decide.
     """
     before = tail = 0.0
     _set_mechanism(section, desk)
@@ -465,7 +469,8 @@ def close(section, m, y, w, desk):
                 tail = _greatest(desk.single, tail)
             if not tail <= DECAY * np.sqrt(section.tolerance):
                 return NO_STEP, tail
-            return (DONE if _least_gap(section, y, w, desk) > LIMIT_SINE else LIMIT), tail
+            near = LIMIT_SINE + BETWEEN * desk.lengths[0, 0]
+            return (DONE if _least_gap(section, y, w, desk) > near else LIMIT), tail
         before = change
     return DIVERGED, tail
 

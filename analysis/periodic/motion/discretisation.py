@@ -49,8 +49,6 @@ _FEWEST = 8
 #: Collocation: calls that use shooting after collocation has failed; elements in a turn at first; greatest number of elements
 #: for each piece, in addition to eight times the first number; calls after which the elements are chosen again.
 _PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 8, 8, 64
-#: Clearance to the limit of assembly below which shooting takes over: between the nodes the links may come nearer.
-_NEAR = 1e-2
 
 
 class OrbitError(LinkworkError):
@@ -341,7 +339,7 @@ class Discretisation:
                 raise orbit_error(status, flow, starts[0])
             if status == Status.DONE:
                 clearance = float(found.clearance[0])
-                if clearance < _NEAR:
+                if clearance < collocation.BETWEEN * np.diff(self._mesh).max():
                     return None
                 self._value = value
                 return _ends(found.rows, n)._replace(clearance=clearance)
