@@ -309,6 +309,12 @@ class TestTolerances:
         angle = float(top.strip("│ ").split("│")[-1])
         assert min(abs(angle - 99.3), abs(angle - 285.3)) > 10.0
 
+    def test_a_derivative_that_is_zero_all_over_the_turn_has_no_crank_angle(self, linkwork):
+        result = linkwork("tolerances", "--shift", "0 in", "--points", 9, "--samples", 10, "--no-plot")
+        assert result.exit_code == 0, result.output
+        top = next(line for line in result.output.splitlines() if "guide.twist" in line)
+        assert [cell.strip() for cell in top.split("│")[-4:-1]] == ["0", "0", ""]
+
 
 class TestDual:
     @pytest.mark.parametrize(

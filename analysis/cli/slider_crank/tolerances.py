@@ -171,8 +171,9 @@ def _sensitivity_table(
             # a value that is only a rounding error compared with the greatest effect of any tolerance is printed as zero
             tiny = 1e-12 * effect / t.half_width * scale
             here, most = (_number(values[i] if np.ma.abs(values[i]) > tiny else values[i] * 0.0) for i in (place, top))
-            # there may be no angle that is far enough from poles and limits
-            ends = (most, f"{_degrees(turn, top):.1f}") if greatest[top] >= 0.0 else ("none", "")
+            # zero has no angle; there may be no angle that is far enough from poles and limits
+            at = f"{_degrees(turn, top):.1f}" if greatest[top] > tiny else ""
+            ends = (most, at) if greatest[top] >= 0.0 else ("none", "")
             rows.append((name, t.name, unit, here, *ends))
     return rows, columns
 
