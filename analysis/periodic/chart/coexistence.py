@@ -549,8 +549,8 @@ def _ends(
 ) -> FloatArray:
     """Return for each start an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
-    A start is the first known motion with other values of one coordinate and its rate: the coordinate with the index ``place``
-    in y is one value of ``across``, shape (points,); the rate is one of ``rates``, the same in a row. ``measures`` are those of
+    Each start is the start of the first known motion, but with a value of ``across``, shape (points,), for the coordinate with
+    the index ``place`` in y, and with a value of ``rates`` for its rate, which is the same in a row. ``measures`` are those of
     `_measures`.
     """
     starts = np.tile(known[0], (len(rates) * len(across), 1))

@@ -411,7 +411,10 @@ def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints,
 
 
 def _collected(v: Dual, g: float, squares: tuple[float, float, float]) -> Dual:
-    """Return the momentum's rate over the mass, for the rate ``v`` of the dual velocity, centre of mass g, squared radii."""
+    """Return the rate of a body's dual momentum divided by its mass; ``v`` is the rate of its dual velocity.
+
+    ``g`` places its centre of mass, ``squares`` are its squared radii of gyration.
+    """
     (x, y, z), (xd, yd, zd), (kx, ky, kz) = v.real, v.dual, squares
     return _dual([xd, yd + g * z, zd - g * y], [kx * x, ky * y - g * zd, kz * z + g * yd])
 
