@@ -105,7 +105,8 @@ def plot_outputs(run: Trajectory, names: Sequence[str] | None = None, *, title: 
 def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: str = "") -> style.Figure:
     """Plot many runs: the median of outputs over time, and the ranges in which 90 % of the runs and all runs are.
 
-    Median and ranges at a time are those of the runs that reach this time; the foot says how many do not reach the end.
+    Median and ranges at a time are those of the runs that reach this time; the foot says how many do not reach the end. The
+    angles of a link begin within half a turn of that of the first run.
 
     Parameters
     ----------
@@ -129,6 +130,7 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
         if name in wrapping_outputs():
             for row, count, i in zip(values, runs.counts.tolist(), range(len(runs))):
                 row[:count] = runs[i].unwrapped(name)
+            values += _whole_turns(values[np.argmax(runs.counts > 0), 0] - values[:, :1])
         unit, factor = display_unit(known[name])
         reached = ~np.isnan(values).all(axis=0)
         least, low, median, high, greatest = factor * np.nanpercentile(
@@ -338,7 +340,12 @@ def plot_comparison(
 def _side_by_side(first: Trajectory, second: Trajectory, name: str, n: int) -> tuple[FloatArray, FloatArray]:
     """Return the first n values of an output of two runs; unwrapped angles begin within half a turn of each other."""
     a, b = first.unwrapped(name)[:n], second.unwrapped(name)[:n]
-    return a, b + 2.0 * pi * np.rint((a[:1] - b[:1]) / (2.0 * pi)) if name in wrapping_outputs() else b
+    return a, b + _whole_turns(a[:1] - b[:1]) if name in wrapping_outputs() else b
+
+
+def _whole_turns(difference: FloatArray) -> FloatArray:
+    """Return the whole turns (rad) nearest to a difference of two angles."""
+    return 2.0 * pi * np.rint(difference / (2.0 * pi))
 
 
 def _rounding_text(a: FloatArray, b: FloatArray, unit: str) -> str:

@@ -142,6 +142,23 @@ def test_many_runs_are_the_quantiles_of_those_that_last(outputs: list[str] | Non
     assert figure.get_supxlabel() == "5 runs; ended early, and left out from there on: 1."
 
 
+def test_the_angle_of_a_link_about_half_a_turn_is_not_torn_apart_in_many_runs() -> None:
+    at = np.radians(-94.5)
+    bar = linkage("beside-half-a-turn", ground={"A": (0, 0), "D": (0.15 * np.cos(at), 0.15 * np.sin(at))})
+    for name, ends, length in (("crank", "AB", 0.03), ("coupler", "BC", 0.15), ("rocker", "CD", 0.1)):
+        bar.body(name, bar=tuple(ends), length=length, mass=0.1)
+    name = bar.freedom("crank", "A", speed="60 rpm", start=at).mechanism().name
+    runs = simulate_many(name, vary={"rocker.length": np.linspace(0.09, 0.11, 5)}, stop_time=0.2)
+    angles = np.array(runs.output("rocker.angle"))
+    assert angles[[0, -1], 0] == pytest.approx([np.pi, -np.pi], abs=0.1)
+    axis = figures.plot(runs, ["rocker.angle"]).axes[0]
+    (median,) = axis.lines
+    every = np.degrees(angles % (2.0 * np.pi))
+    assert np.asarray(median.get_ydata()) == pytest.approx(np.median(every, axis=0))
+    shade = np.asarray(axis.collections[0].get_paths()[0].vertices)[:, 1]
+    assert (shade.min(), shade.max()) == pytest.approx((every.min(), every.max()))
+
+
 def test_a_run_that_ended_early_says_why_and_its_texts_cover_nothing(run) -> None:
     figure = figures.plot(replace(run, status=3, message="limit of assembly at t = 1 s"), title="a run")
     assert figure.get_supxlabel().splitlines()[-1] == "The run ended early: limit of assembly at t = 1 s."
