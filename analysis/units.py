@@ -211,7 +211,7 @@ _LONGEST = 100
 #: Spellings of revolutions per minute, and of products of units, that machine builders use and pint does not know.
 _TURNS = re.compile(r"(?<=[0-9.\s])(?:(?i:rpm|(?:r|rev|U)/min|min\s*(?:\^|\*\*)?\s*-1)|(?<=\s)1/min)(?=\s*$)")
 _WITH_NEWTON = re.compile(r"(?<![^\W\d_])([kmM]?N)([cm]?m)?(s)?(?![^\W\d_])")
-_WITH_GRAM = re.compile(r"(?<![^\W\d_])(k?g)([cm]?m)(?![^\W\d_])")
+_WITH_GRAM = re.compile(r"(?<![^\W\d_])(k?g)([cm]?m)(?![^\W\d_²])")
 #: By SI unit: patterns of other spellings; and usual units, for error messages.
 _SPELLINGS = {
     "rad/s": _TURNS,

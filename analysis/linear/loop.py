@@ -172,6 +172,8 @@ class LoopResult:
         Force (N) and reference (m); each value holds until the next sample.
     freedom : int
         Index of the controlled degree of freedom; by default the last.
+    unit : str
+        SI unit of the controlled coordinate.
     trajectory : Trajectory or None
         All outputs of the plant; None for a linear model.
     status : int
@@ -185,6 +187,7 @@ class LoopResult:
     force: FloatArray
     reference: FloatArray
     freedom: int = -1
+    unit: str = "m"
     trajectory: Trajectory | None = None
     status: int = 0
     message: str = ""
@@ -207,14 +210,14 @@ class LoopResult:
             raise InputError(f"the run did not reach its end: {self.message}")
         return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
 
-    @in_si(band="m", start="s", window="s")
+    @in_si(start="s", window="s")
     def metrics(self, *, band: Amount, start: Amount = 0.0, window: Amount = None) -> LoopMetrics:
         """Compute settling time, overshoot, force and tracking error.
 
         Parameters
         ----------
         band : float
-            Half width of the band about the reference in which the coordinate counts as settled (m).
+            Half width of the band about the reference in which the coordinate counts as settled (m, or rad for an angle).
         start : float
             Time at which the reference jumps, or control begins (s).
         window : float, optional
@@ -225,8 +228,9 @@ class LoopResult:
         InputError
             If band or window is not greater than zero, the start is not within the run, or the run ended early.
         """
+        band = si(band, self.unit, "band")
         if not band > 0.0:
-            raise InputError(f"band of settling is {band} m: it must be greater than zero")
+            raise InputError(f"band of settling is {band} {self.unit}: it must be greater than zero")
         length = self.time[-1] - self.time[0]
         window = 0.1 * length if window is None else window
         end = self.end(window)
@@ -313,6 +317,7 @@ def run_loop(
         force=table[:, -2],
         reference=table[:, -1],
         freedom=freedom,
+        unit=unit,
         status=status,
         message=message,
     )

@@ -69,6 +69,7 @@ from linkwork.errors import InputError, Interrupted, MissingParameterError, Para
         ("3 Nms/rad", "N.m.s/rad", 3.0),
         ("3 Ns/mm", "N.s/m", 3000.0),
         ("3 kgm2", "kg.m2", 3.0),
+        ("3 kgcm²", "kg.m2", 3e-4),
         (0.25, "m", 0.25),
         (3, "1", 3.0),
         (np.float32(0.25), "m", 0.25),

@@ -145,6 +145,16 @@ def test_amounts_are_texts_with_units_and_a_name_stands_alone(held) -> None:
     assert held.to_state_space("slider.position", "slider.force").input_labels == ["slider_force"]
 
 
+def test_the_band_of_an_angle_is_an_angle(hanging) -> None:
+    design = lin.design_lqr(hanging, {"crank.angle": 1e2, "slider.position": 1e6}, channel="drive.torque")
+    loop = lin.predict_loop(hanging, lin.SampledController(design, "2 ms"), 0.1 + hanging.state[0], stop_time=0.5)
+    assert loop.metrics(band="1 deg") == loop.metrics(band=pi / 180.0)
+    with pytest.raises(ParameterError, match="band is '1 mm': it must be a number in rad"):
+        loop.metrics(band="1 mm")
+    with pytest.raises(InputError, match="band of settling is 0 rad"):
+        loop.metrics(band=0)
+
+
 def test_the_closed_loop_has_the_poles_and_no_static_error(held) -> None:
     design = lin.design_pid(held, bandwidth=80.0)
     closed = design.closed_loop(("slider.position", "slider.acceleration"))
