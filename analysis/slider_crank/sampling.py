@@ -181,20 +181,26 @@ class MonteCarlo:
             If the quantity was not sampled.
         """
         check_names((quantity,), self.spreads, "quantity")
-        used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
-        return cast(MaskedArray, self.spreads[quantity].deviation / np.sqrt(used))
+        return cast(MaskedArray, self.spreads[quantity].deviation * self._of_the_mean)
+
+    @property
+    def _of_the_mean(self) -> FloatArray:
+        """Return the standard error of the mean of the samples divided by their standard deviation, shape (n,)."""
+        return 1.0 / np.sqrt(np.maximum(self.samples - self.not_assembled - self.undetermined, 2))
 
     def linear_misses(self, quantity: str) -> NDArray[np.bool_]:
         """Return a mask (n,) of the angles at which the linear estimate fails.
 
         The estimate fails if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five
-        standard errors of the samples, or if a dead centre is so near that there is no estimate.
+        standard errors, of the estimate or the samples, whichever is greater, or if a dead centre is so near that there is no
+        estimate.
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
         sd = spread.deviation
-        # up to a kurtosis of five, the standard error of a standard deviation is at most that of the mean
-        allowed = OFF * sd + 5.0 * self.standard_error(quantity)
+        # a few samples may be close together by chance; up to a kurtosis of five, the standard error of a standard deviation is
+        # at most that of the mean
+        allowed = (OFF + 5.0 * self._of_the_mean) * np.ma.maximum(sd, linear.deviation)
         rounding = 1e-9 * np.ma.abs(linear.nominal)
         off = (np.ma.abs(spread.mean - linear.nominal) > allowed + rounding) | (
             np.ma.abs(sd - linear.deviation) > allowed + rounding

@@ -334,7 +334,7 @@ class Tolerance:
             raise InputError(
                 f"the distribution of {self.name} is {self.distribution!r}: it must be one of {', '.join(_DISTRIBUTIONS)}"
             )
-        if value is None or not (isfinite(value) and value > 0.0):
+        if not (isinstance(value, (int, float, np.number)) and isfinite(value) and value > 0.0):
             found = f"{value!r} {ERRORS[self.name]}".rstrip()
             raise InputError(f"the tolerance of {self.name} is {found}: it must be a finite number greater than zero")
 

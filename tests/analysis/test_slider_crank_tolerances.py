@@ -472,12 +472,19 @@ def test_samples_at_a_dead_centre_itself_are_counted() -> None:
         result.place("slider.load", 0.5 * pi)
 
 
+def test_two_samples_do_not_refute_the_linear_estimate() -> None:
+    turn, tolerances = offset_turn([0.3, 2.0]), [Tolerance("rod.length", 1e-5)]
+    found = [monte_carlo(turn, tolerances, samples=2, seed=seed) for seed in range(40)]
+    assert not any(one.linear_misses("slider.position").any() or one.notes() for one in found)
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
         (("crank.colour", 1.0), ParameterError, "crank.colour"),
         (("groove.amplitude", 1.0), ParameterError, "groove.amplitude"),
         (("rod.length", None), InputError, "rod.length"),
+        (("rod.length", [1e-3]), InputError, "rod.length"),
         (("rod.length", 0.0), InputError, "rod.length"),
         (("rod.length", np.nan), InputError, "rod.length"),
         (("rod.length", 1.0, "cauchy"), InputError, "'cauchy'.*normal, uniform, triangular"),
