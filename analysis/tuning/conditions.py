@@ -47,8 +47,6 @@ ITERATIONS, FOUND = 12, 1e-9
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a motion counts as lost.
 _HALVINGS = 3
-#: Number of samples of a common period.
-_SAMPLES = 256
 
 
 class LostError(LinkworkError):
@@ -97,8 +95,8 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
 
 
 def sample_turn(orbit: PeriodicOrbit, limit: Limit) -> Turn:
-    """Return the outputs over the period, with `_SAMPLES` samples for each common period, or as many as the limit needs."""
-    return orbit.resolved_turn(limit.parts, _SAMPLES * orbit.periods)
+    """Return the outputs over the period, with as many samples as the limit needs."""
+    return orbit.resolved_turn(limit.parts)
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:

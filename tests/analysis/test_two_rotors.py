@@ -280,6 +280,18 @@ def test_every_search_finds_the_one_motion_there_is() -> None:
     assert (all_of_it.ends == 0).all()
 
 
+def test_a_common_period_of_many_turns_has_as_many_samples_in_each() -> None:
+    """In 256 and in 64 samples of eleven turns the greatest values lie up to a hundredth lower."""
+    speeds, drive = (20.0, 20.0 * 13 / 11), _drive(20.0, Fraction(13, 11))
+    wanted = _cart(speeds, (0.0, 0.0), np.linspace(0.0, 22.0 * pi / 20.0, 100_001))
+    turn = newton_orbit(P, drive).turn()
+    assert [turn["cart.position"].max(), turn["cart.position"].min()] == pytest.approx(
+        [wanted.max(), wanted.min()], rel=3e-4
+    )
+    found = coexistence(plane(P, drive, "left.speed", "cart.damping"), [20.0], [P.cart_damping])
+    assert found.amplitude[0, 0, 0] == pytest.approx(0.5 * np.ptp(wanted), rel=1e-4)
+
+
 def test_the_motion_changes_with_the_parameters_of_the_cart_and_of_both_rotors_as_its_closed_form_does() -> None:
     speeds, unbalances = np.array([20.0, 30.0]), np.array([K.unbalance1, K.unbalance2])
     motion = motion_gradient(newton_orbit(P, _drive(20.0, Fraction(3, 2))))

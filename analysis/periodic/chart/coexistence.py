@@ -207,11 +207,12 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
     if any((row.flow, row.switched) != (first.flow, first.switched) for row in rows):
         return np.vstack([_compute_motions(guesses, [row]) for row in rows])
     count, n = m * len(rows), first.flow.size
-    shapes = (count, MOST_ORBITS, n), (count, MOST_ORBITS, n * n), (count, MOST_ORBITS, SAMPLES)
+    samples = SAMPLES * first.flow.turns
+    shapes = (count, MOST_ORBITS, n), (count, MOST_ORBITS, n * n), (count, MOST_ORBITS, samples)
     starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
     counts = np.zeros(count, dtype=np.int64)
     section = first.first.section(guesses[0], *_SEARCHED, switched=first.switched)
-    angles = np.linspace(0.0, first.flow.period, SAMPLES, endpoint=False)
+    angles = np.linspace(0.0, first.flow.period, samples, endpoint=False)
     points = Points(*map(np.vstack, zip(*[row.points() for row in rows])))
     kernels.solve_all(section, points, first.search(), m, angles, guesses, Motions(starts, monodromies, swings, counts))
     largest, signs = np.full((2, count, MOST_ORBITS), np.nan)
@@ -220,7 +221,7 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
     largest[found] = np.abs(multipliers(of))[:, 0]
     signs[found] = index(of)
     # evaluate the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
-    fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
+    fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * samples, axis=2) * 8.0
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan

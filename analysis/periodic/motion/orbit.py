@@ -62,7 +62,7 @@ MOST_ITERATIONS = 40
 SETTLING_TURNS, SETTLED = 200, 1e-4
 #: Samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
-#: Greatest number of samples of a common period where a motion is sharp, as at a stop, and size of the highest harmonics,
+#: Greatest number of samples of a turn where a motion is sharp, as at a stop, and size of the highest harmonics,
 #: relative to the greatest harmonic, above which there are more samples.
 _MOST_SAMPLES, _SHARP = 8192, 1e-5
 #: Error of an amplitude, relative to the scale of the coordinate: a little more than that of the orbits.
@@ -344,9 +344,10 @@ class PeriodicOrbit(NotebookResult):
             raise orbit_error(status, self.flow, self.start)
         return rows
 
-    def turn(self, samples: int = SAMPLES) -> Turn:
-        """Return the outputs over one period at equal steps of the crank angle."""
+    def turn(self, samples: int | None = None) -> Turn:
+        """Return the outputs over one period at equal steps of the crank angle, by default `SAMPLES` for each turn of it."""
         flow, mechanism = self.flow, self.point.mechanism
+        samples = samples or SAMPLES * self.crank_turns
         angles = np.linspace(0.0, flow.period * self.turns, samples, endpoint=False)
         rows = self.sample(angles)
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
@@ -369,9 +370,9 @@ class PeriodicOrbit(NotebookResult):
             angles=frozenset(v.name for v in mechanism.variables if v.unit == "rad"),
         )
 
-    def resolved_turn(self, outputs: Sequence[str], samples: int = SAMPLES) -> Turn:
+    def resolved_turn(self, outputs: Sequence[str]) -> Turn:
         """Return the outputs as `turn` does, with as many samples as the Fourier series of the named outputs need."""
-        turn, most = self.turn(samples), _MOST_SAMPLES * self.periods
+        turn, most = self.turn(), _MOST_SAMPLES * self.crank_turns
         roundings = dict(zip(turn.swings, turn.roundings))
         while len(turn.angle) < most and any(
             _is_sharp(turn.oscillation(name), roundings.get(name, 0.0)) for name in outputs
@@ -390,7 +391,7 @@ class PeriodicOrbit(NotebookResult):
         names = [name for name, _ in self.flow.components[: self.flow.swing_count]]
         return self.resolved_turn(names).amplitudes
 
-    def clearance(self, samples: int = SAMPLES) -> float:
+    def clearance(self, samples: int | None = None) -> float:
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""
         equations, p = self.point.mechanism.equations, self.parameters.constants()
         modes, turn = tuple(float(value) for value in self.flow.modes), self.turn(samples)

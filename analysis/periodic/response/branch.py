@@ -389,7 +389,7 @@ def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
     orbit = point.data
     if orbit.largest > largest:
         return f"beyond this point a disturbance grows more than {largest:g} times per period (the largest Floquet multiplier)"
-    sine = orbit.clearance(64) if orbit.least_clearance is None else orbit.least_clearance
+    sine = orbit.clearance(64 * orbit.crank_turns) if orbit.least_clearance is None else orbit.least_clearance
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
     return ""
