@@ -20,8 +20,8 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     """Print the parameters that move each special point and its amplitude most; write all elasticities to a table.
 
     The parameter of the response is printed in ``unit``; ``factor`` is the factor from SI to it. The table at ``path`` has one
-    row for each special point, in the order in which the points are printed. Without a special point with a gradient no path
-    is returned.
+    row for each special point, in the order in which the points are printed. Return its path, or no path if no special point
+    has a gradient.
     """
     from ..files import write_csv
     from ..periodic import gradient_names, parameter_value, special_gradient

@@ -166,9 +166,10 @@ class PeriodicModel(Matrices):
                 )
 
     def check_resolution(self) -> None:
-        """Check that the samples resolve dry friction: the mean decay rate, of the trace of A, is that of many more samples.
+        """Check that the samples resolve dry friction: compare their mean of the trace of A with that of many more samples.
 
-        Friction makes A large for the short time in which a rate passes through zero, which a sample hits or misses.
+        Friction makes A large for the short time in which a rate passes through zero, which a sample hits or misses. Minus the
+        mean of the trace is the mean decay rate.
 
         Raises
         ------

@@ -186,7 +186,7 @@ class Walk:
     def arguments(self, name: str, whatever: bool = False) -> list[Any] | None:
         """Return legal arguments of a function; None if there are none now.
 
-        With ``whatever`` a call that gets or sets variables takes any variable if no variable is allowed now.
+        If ``whatever`` is true and no variable is allowed now, a call that gets or sets variables takes any variable.
         """
         group = name[3:]
         if name[:3] in ("Get", "Set") and group in self.model.c_types:

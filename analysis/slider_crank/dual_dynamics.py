@@ -149,7 +149,10 @@ def rates(
     matrix[:, 6, 0] = 1.0
 
     def solve(known: Dual, turning: Dual) -> FloatArray:
-        """Return the joint rates, shape (n, 7), from the known velocity of the loop and the known rotation of the rod."""
+        """Solve the seven equations for the joint rates or their derivatives, shape (n, 7).
+
+        ``known`` is the sum of the loop's known terms; the real part of ``turning`` is the known part of the rod's rotation.
+        """
         spin = np.sum(turning.real * rod.real[..., 0], -1)
         right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
         return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])

@@ -19,12 +19,13 @@ def _repeat(numbers, lanes, target):
 
 @kernel(types.UniTuple(int64, 2)(int64, int64, VECTOR, VECTOR, MATRIX, float64, MATRIX), purpose=_PURPOSE)
 def evaluate_samples(code, lanes, nominal, values, errors, least_lever, out):
-    """Evaluate samples at one crank angle, ``lanes`` at once; write those that count into the columns of ``out``.
+    """Evaluate samples at one crank angle, ``lanes`` at once; write the results of usable samples into ``out``.
 
-    ``code`` is the address of the function of the nominal motion, the errors, rows of ``errors``, and the parameters
-    ``values``. Its outputs are the rows of ``out``: the last one is not negative if the sample can be assembled, the one
-    before is the lever arm, whose magnitude must be above ``least_lever``. Returns the number of samples that cannot be
-    assembled, and the number of those without a lever.
+    ``code`` is the address of a function of the motion ``nominal``, the errors of a sample (a column of ``errors``) and the
+    parameters ``values``. Its results become a column of ``out``. The last result is not negative if the sample can be
+    assembled; the result before it is the lever arm. A sample is usable if it can be assembled and the magnitude of its
+    lever arm is above ``least_lever``. Returns the number of samples that cannot be assembled, and the number of the others
+    that are not usable.
     """
     m, n, k = errors.shape[0], errors.shape[1], out.shape[0]
     a, b, c = np.empty(nominal.shape[0] * lanes), np.zeros(m * lanes), np.empty(values.shape[0] * lanes)

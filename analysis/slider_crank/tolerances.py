@@ -254,7 +254,10 @@ def add_errors(
     nominal: Instant,
     errors: Mapping[str, Any],
 ) -> PerturbedTurn:
-    """Add ``errors`` by name to the parameters ``values`` and to the motion; ``f`` are the equations for such values."""
+    """Add ``errors`` by name to the parameters ``values`` and to the motion.
+
+    ``f`` are the plant's equations for the type of the errors: arrays, dual numbers or symbols.
+    """
     moved = {field_name(name): values[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)}
     p = f.find(SliderCrankParameters.constants)(SimpleNamespace(**{**values, **moved}))
     angle = nominal.angle + errors.get(ANGLE, 0.0)

@@ -144,7 +144,7 @@ class Part:
         return cls(name=name, fmu=Path(fmu), ports=ports, values=values, feeds=feeds, description=description)
 
     def base_unit(self, port: str) -> tuple[Any, ...] | None:
-        """Return the unit of a port in base units, with factor and offset; None if the FMU does not tell any units.
+        """Return the unit of a port in base units, with factor and offset; None if the FMU states no units.
 
         A port without a unit is dimensionless. A unit without a definition in base units is returned by its name.
         """

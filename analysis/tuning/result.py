@@ -126,7 +126,7 @@ def _ends_text(wish: Wish, region: Region) -> str:
 
 
 def _interval_reading(wish: Wish, intervals: Sequence[tuple[float, float, str]], span: tuple[float, float]) -> Reading:
-    """Return the state of the requirement that ``span`` overlaps none of ``intervals``, each with the words for it."""
+    """Return the state of the requirement that ``span`` overlaps none of ``intervals`` (low, high, description)."""
     if not intervals:
         return Reading(text="none")
     low, high = span
@@ -153,8 +153,8 @@ class Verification:
     orbits : int
         Number of motions of the response over the range.
     charted, largest, place : int, float, str
-        Number of points of a stability chart's row over the range, the largest multiplier at these points, and the level of
-        this multiplier.
+        Number of points of a stability chart's row over the range, the largest multiplier at these points, and the level at
+        which it occurs.
     sought : int
         Number of levels at which all motions were sought.
     several : str

@@ -84,7 +84,7 @@ def make_tracks(section, columns):
 
 @inner
 def set_mechanism(lane, section, v):
-    """Write the mechanism and the drive of a lane, and the magnitudes of z."""
+    """Write the mechanism and the drive of ``section``, and the magnitudes of z, into a lane of the work space."""
     scale, n = section.scale, section.scale.shape[0]
     write_mechanism(lane, section, v)
     for i in range(n):

@@ -59,7 +59,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
     """Return the FMI name of the stiffness of the spring of the only degree of freedom that is not a crank.
 
     The name is, for example, ``slider.stiffness``. It is empty if there is no such spring, or if the mechanism has several
-    oscillating degrees of freedom or springs with laws, so that no natural frequency is that of this spring alone.
+    oscillating degrees of freedom or a spring with a force law, so that no natural frequency is that of this spring alone.
     """
     others = oscillating_freedoms(mechanism)
     if len(others) != 1 or mechanism.names("law"):

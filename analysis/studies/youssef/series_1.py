@@ -199,7 +199,7 @@ def two_positions() -> StudyResult:
 
 
 def _upright_errors(rotation: FloatArray, places: ComplexArray) -> FloatArray:
-    """Return how close P comes to each point when the rocker is upright, by (7.15), in l3; NaN if it is out of reach."""
+    """Return how close (in units of l3) P comes to each point with the rocker upright, by (7.15); NaN if out of reach."""
     pins = LINKAGE.crank_length * np.exp(1j * rotation)[:, None]
     with np.errstate(invalid="ignore"):
         arms = solve_slider_equations(rotation, places)[0] + 1j * LINKAGE.rocker_length - pins

@@ -122,9 +122,9 @@ class _FiveBarShapes(_FourBarShapes):
 
     @staticmethod
     def meets_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return for each shape whether it meets the least transmission angle (rad) at `AROUND` rotations.
+        """Return for each shape whether it meets the least transmission angle (rad) over a turn of the gears' input.
 
-        A few rotations are tried first; the remaining rotations are tried only for the shapes that passed.
+        It is checked at `AROUND` rotations: first at a few of them, then, for the shapes that passed, at the others.
         """
         turned = limits.gears
         allowed = np.ones(len(shapes), dtype=bool)
@@ -275,7 +275,10 @@ def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits)
 
 
 def _size_range(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the greatest factor that brings all ``links`` of a shape within their bounds, each shape (m,)."""
+    """Return the least and the greatest length (m,) of the base link at which all ``links`` are within their bounds.
+
+    Each row of ``links`` has the links of one shape, relative to the base link.
+    """
     second = limits.second or (0.0, inf)
     there = links > 0.0
     low, high = (

@@ -164,7 +164,7 @@ class Limits:
         return (1, 0) if self.second is None else gear_turns(self.ratio)
 
     def second_crank(self, unit: float) -> CrankUnknown | None:
-        """Return the unknowns of a geared five-bar's second crank, otherwise None. ``unit`` is the target's size (m)."""
+        """Return the unknowns of the second crank; None for a linkage without one. ``unit`` is the target's size (m)."""
         if self.second is None:
             return None
         low, high = self.second
