@@ -17,6 +17,7 @@ from scipy.special import ndtr
 from linkwork.errors import InputError
 
 from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, shown_units
+from ..units import Amount
 from . import style
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
@@ -141,7 +142,7 @@ def _force_panel(
 @plot.register
 @style.figure_style()
 def plot_tolerances(
-    found: MonteCarlo, quantity: str = "slider.position", angle: float = 0.0, *, units: str = "SI", title: str = ""
+    found: MonteCarlo, quantity: str = "slider.position", angle: Amount = 0.0, *, units: str = "SI", title: str = ""
 ) -> Figure:
     """Plot the errors that tolerances cause over the turn; at one crank angle, plot the samples and each tolerance's share.
 
@@ -155,8 +156,8 @@ def plot_tolerances(
     found : MonteCarlo
     quantity : str
         Name of a sampled quantity.
-    angle : float
-        Crank angle (rad) of histogram and shares; the nearest sampled angle is used.
+    angle : float or str
+        Crank angle (rad, or a text with its unit) of histogram and shares; the nearest sampled angle is used.
     units : str
         One of `analysis.slider_crank.UNITS`. With "SI" lengths are shown in mm.
     title : str

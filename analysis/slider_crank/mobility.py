@@ -29,6 +29,7 @@ from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..run import takes_published
+from ..units import Amount, in_si
 
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros in one such piece are not found.
 FINEST = 1e-3
@@ -90,7 +91,8 @@ class PeriodicShift:
         return 2.0 * pi * self.turns
 
 
-def constant_shift(shift: float) -> PeriodicShift:
+@in_si(shift="m")
+def constant_shift(shift: Amount) -> PeriodicShift:
     """Return the law of a crank held at the shift S1 (m).
 
     Raises

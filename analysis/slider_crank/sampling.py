@@ -23,6 +23,7 @@ from ..numerics.codegen import MAKING, MachineCode
 from ..numerics.lanes import width
 from ..numerics.symbolic import library, symbolic_functions
 from ..numerics.workers import check_jobs, run_in_parallel, worker_count
+from ..units import Amount, in_si
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .kernels import collect_bins, count_in_bins, evaluate_samples
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, shown_units
@@ -207,8 +208,11 @@ class MonteCarlo:
         )
         return cast(NDArray[np.bool_], np.ma.filled(off, False)) | self._without_estimate(quantity)
 
-    def place(self, quantity: str, angle: float) -> int:
+    @in_si(angle="rad")
+    def place(self, quantity: str, angle: Amount) -> int:
         """Return the index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
+
+        For an angle outside of the sampled ones whole turns count as none, if the shift is known to repeat after them.
 
         Raises
         ------
@@ -218,7 +222,10 @@ class MonteCarlo:
             If the quantity is not determined there.
         """
         check_names((quantity,), self.spreads, "quantity")
-        i = int(np.argmin(np.abs(self.turn.angle - angle)))
+        away, shift = self.turn.angle - angle, self.turn.law.periodic_shift(self.turn.parameters)
+        if shift is not None and (away.min() > 0.0 or away.max() < 0.0):
+            away -= shift.span * np.rint(away / shift.span)
+        i = int(np.argmin(np.abs(away)))
         spread, linear = self.spreads[quantity], self.estimates[quantity]
         if np.ma.getmaskarray(spread.percentiles)[0, i] or np.ma.getmaskarray(linear.nominal)[i]:
             if self.turn.without_lever:

@@ -469,6 +469,10 @@ def test_close_pairs_of_dead_centres_are_found(gap: float) -> None:
     assert angles == pytest.approx(sorted([1.0 - gap, 1.0 + gap, *others]), abs=1e-8)
 
 
+def test_a_constant_shift_is_a_number_or_a_text_with_its_unit() -> None:
+    assert M.constant_shift("3.5 in").at(0.0)[0] == pytest.approx(0.0889, rel=1e-14)
+
+
 # ------------------------------------------------------------------ what is refused
 
 

@@ -472,6 +472,17 @@ def test_samples_at_a_dead_centre_itself_are_counted() -> None:
         result.place("slider.load", 0.5 * pi)
 
 
+@pytest.mark.parametrize("repeats", [True, False])
+def test_the_place_of_an_angle_of_another_turn(repeats: bool) -> None:
+    zero = np.zeros_like
+    law = ConstantShift(0.0) if repeats else AngleShift(zero, zero, zero)
+    turn = force_turn(OFFSET, crank_speed=5.0, shift=law, angles=["10 deg", "30 deg", "350 deg"])
+    found = monte_carlo(turn, [Tolerance("rod.length", 1e-5)], samples=10)
+    assert [found.place("slider.position", f"{angle} deg") for angle in (32, 355, -10, 370)] == (
+        [1, 2, 2, 0] if repeats else [1, 2, 0, 2]
+    )
+
+
 def test_two_samples_do_not_refute_the_linear_estimate() -> None:
     turn, tolerances = offset_turn([0.3, 2.0]), [Tolerance("rod.length", 1e-5)]
     found = [monte_carlo(turn, tolerances, samples=2, seed=seed) for seed in range(40)]
