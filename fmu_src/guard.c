@@ -498,14 +498,15 @@ CALL(CancelStep, (fmi2Component component), true)
 CALL(GetIntegerStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value), value, kind, value)
 CALL(GetStringStatus, (fmi2Component component, const fmi2StatusKind kind, fmi2String *value), value, kind, value)
 
-#define STATUS(name, type, wanted, found)                                                                                      \
+#define STATUS(name, type, wanted, known, found)                                                                               \
     fmi2Status fmi2##name(fmi2Component component, const fmi2StatusKind kind, type *value) {                                   \
         Guard *c = component;                                                                                                  \
         if (!c || !value) return refuse(c, "fmi2" #name ": a null pointer");                                                   \
         if (kind != (wanted)) return mild(next.name(begin(c), kind, value));                                                   \
+        if (!(known)) return fmi2Discard;                                                                                      \
         *value = found;                                                                                                        \
         return fmi2OK;                                                                                                         \
     }
-STATUS(GetStatus, fmi2Status, fmi2DoStepStatus, c->refused ? fmi2Discard : fmi2OK)
-STATUS(GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->time)
-STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, c->refused)
+STATUS(GetStatus, fmi2Status, fmi2DoStepStatus, true, c->refused ? fmi2Discard : fmi2OK)
+STATUS(GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->time == c->time, c->time)
+STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, true, c->refused)

@@ -135,6 +135,7 @@ assert i.step(2e-3, -1.0) == 2 and last() == ((0, 1), 2e-3)
 i.run([1e-3], 2e-3)
 assert last() == ((0, 0), 3e-3) and i.step(3e-3, -1.0) == 2
 assert i.restore(before) == 0 and i.terminated() == (0, 0)
+assert i._call("GetRealStatus", c_int(2), byref(c_double())) == 2
 assert i.step(0.0, -1.0) == 2 and last() == ((0, 1), 0.0)
 assert i.reset() == 0 and i.start(start=5.0) and last() == ((0, 0), 5.0)
 assert i.step(5.0, -1.0) == 2 and last() == ((0, 1), 5.0)
