@@ -156,7 +156,7 @@ class Outputs:
                 continue
             line = f"b.{joint}_line"
             normal = f"{line}.c * f.in_{r.name}.y - {line}.s * f.in_{r.name}.x"
-            text = f"Force {of} across the line of {joint}"
+            text = f"Force {of} across the line of {joint}, to the left of the line's direction"
             yield Output(f"{r.name}.force", "N", text, 'role="guide force"', normal)
             block = r.joint.bodies[1]
             text = f"Moment {of} in {joint}, about the origin of the {block}"

@@ -533,6 +533,18 @@ def test_the_force_of_teeth_turns_the_driven_gear() -> None:
     assert abs(run["pair.fx"]).max() < 1e-9
 
 
+def test_the_force_of_a_guide_is_positive_to_the_left_and_acts_where_moment_by_force_says() -> None:
+    """A block slides along -x, so its weight is carried by a force to the right of its way, below its centre of mass."""
+    built = linkage("carried", ground={"O": (0, 0)}, gravity=9.81)
+    built.body("block", points={"C": (0, 0)}, mass=2.0, cog=("30 mm", 0), inertia=1e-3)
+    made = built.slide("G", body="block", through="O", direction="180 deg").freedom("travel", "G").mechanism()
+    run = simulate(made.first_set.parameters, Inputs(force=0.0), stop_time=0.01)
+    assert run["G.force"][-1] == pytest.approx(-2.0 * 9.81)
+    assert run["G.moment"][-1] / run["G.force"][-1] == pytest.approx(0.03)
+    said = next(variable.description for variable in made.variables if variable.name == "G.force")
+    assert said == "Force of the ground on the block across the line of G, to the left of the line's direction"
+
+
 def test_other_freedoms_are_proposed(tmp_path):
     """A Stephenson chain driven on its far side is no chain of dyads: the joints that would do are named."""
     data = {
