@@ -276,12 +276,23 @@ def save_plot(wanted: bool, result: Any, path: str | Path, *more: Any, **options
 plot_option = click.option("--plot/--no-plot", "--plots/--no-plots", default=True, help="Whether to write plots.")
 
 
+class _CaseFile(click.Path):
+    """Path of a case file; the name of a published set is refused with the option that takes it."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from ..mechanisms import PUBLISHED
+
+        if value in PUBLISHED and not Path(value).exists():
+            self.fail(f"{value} is a published set: --published {value}", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 def case_options(published: Iterable[str]) -> Callable[..., Any]:
     """Return a decorator that adds the argument CASE and the options --published and --set: see `chosen_case`.
 
     ``published`` are the names of published sets for the help text.
     """
-    case = click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
+    case = click.argument("case", required=False, type=_CaseFile(exists=True, dir_okay=False))
     words = f"A published set instead of a case: {', '.join(published)}."
     option = click.option("--published", metavar="NAME", help=words)
     setting = set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
@@ -365,10 +376,16 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
 
 
 def quantity(text: str, unit: str, option: str) -> float:
-    """Return the value of an option in SI, from a text such as "420 rpm" or a number without unit, which is in SI."""
+    """Return the value of an option in SI, from a text such as "420 rpm" or a number without unit, which is in SI.
+
+    A note gives a speed without unit in rpm.
+    """
     from .. import units
 
-    return units.quantity(typed_value(text), unit, option)
+    value = units.quantity(given := typed_value(text), unit, option)
+    if value and unit == "rad/s" and not isinstance(given, str):
+        note(f"{option} {text} has no unit and is taken in rad/s, as {units.display_text(value, unit)}")
+    return value
 
 
 def changes(settings: Sequence[str], example: str) -> dict[str, Any]:

@@ -121,8 +121,8 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
         if part.index != part.index_of_all:
             sure = (
                 "there may be another motion, or one at which the links lock: motions come and go in pairs, a stable and an "
-                f"unstable one, and these do not pair up (sum of indices {part.index}, which is {part.index_of_all} of all "
-                "motions)"
+                f"unstable one, and these do not pair up (the sum of their indices is {part.index}; over all motions it is "
+                f"{part.index_of_all})"
             )
         period = "" if len(found) == 1 else f"of {format_count(periods * common, 'turn')}: "
         say(period + sure)

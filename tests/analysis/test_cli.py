@@ -205,6 +205,12 @@ def test_a_bare_speed_under_which_a_run_ends_early_is_asked_about(linkwork, tmp_
     )
 
 
+def test_a_bare_speed_of_an_option_is_said_in_rpm(linkwork):
+    judged = ("stability", "--published", "table-3.1", "--no-chart", "--speed")
+    assert "--speed 40 has no unit and is taken in rad/s, as 381.972 rpm" in linkwork(*judged, "40").stderr
+    assert linkwork(*judged, "40 rad/s").stderr == ""
+
+
 def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
     for group in ([], ["slider-crank"], ["system"]):
         listed = linkwork(*group, "--help").output.partition("Commands:")[2].split("\n  ")[1:]

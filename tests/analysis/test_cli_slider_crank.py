@@ -92,7 +92,9 @@ class TestParameterFiles:
         said = " ".join(linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--units", "inch").stderr.split())
         assert "S1 = 0 in (--shift), no groove (--groove), a crank speed of 50 rpm (--speed)" in said
         assert "rpm" not in linkwork("info", "mine.toml").stderr
-        assert linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--shift", 0, "--speed", 1).stderr == ""
+        assert (
+            linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--shift", 0, "--speed", "1 rad/s").stderr == ""
+        )
         assert linkwork("info", "mine.toml", "--groove", "shaft").stderr == ""
 
     def test_a_file_of_the_other_mechanism(self, linkwork, tmp_path):
