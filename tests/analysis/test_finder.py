@@ -9,6 +9,7 @@ import pytest
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate, variant
 from analysis.linkages import linkage
 from analysis.periodic import (
+    Crossing,
     Drive,
     Extremum,
     Family,
@@ -162,6 +163,27 @@ def test_a_resonance_beside_a_fold_is_found(damping: float) -> None:
     assert (peak.parameter, peak.amplitude) == (pytest.approx(speed, rel=0.06), pytest.approx(ratio * speed, rel=0.06))
     avoided = [a for a in response.speeds_to_avoid if a.risk is Risk.RESONANCE and a.high > 32.0]
     assert [a.high for a in avoided] == [pytest.approx(peak.parameter, rel=1e-4)]
+
+
+def test_a_pitchfork_that_a_step_leaps_over_is_no_fold() -> None:
+    """At 24.8806 rad/s mirror images end, by an independent monodromy matrix, without a jump."""
+    built = linkage("mirrored", ground={"O": (0, 0)})
+    built.body("carriage", points={"P": (0, 0)}, mass=1.0)
+    built.body("rotor", bar=("P", "E"), length=0.1, mass=1.0, cog=(0.08, 0), inertia=0.01)
+    built.slide("rail", body="carriage", through="O").spring("spring", at="rail", law="100*x + 4e6*x**3 + 2*v")
+    rig = built.freedom("rotor", "P", speed=20.0).freedom("across", "rail").mechanism().first_set.parameters
+    response = frequency_response(rig, 8.0, 60.0, doublings=0, greatest_step=1e-2)
+    special = [s for branch in response.branches for s in branch.special]
+    assert {s.kind for s in special} == {Crossing.FOLD, Crossing.BRANCH_POINT}
+    for s in special:
+        assert np.abs(s.orbit.multipliers - 1.0).min() < 1e-5
+        assert s.kind is Crossing.FOLD or s.parameter == pytest.approx(24.8806, abs=1e-4)
+    assert [(jump.direction, jump.parameter) for jump in response.jumps] == [
+        (-1, pytest.approx(15.69128, abs=1e-4)), (1, pytest.approx(18.76291, abs=1e-4)),
+    ]  # fmt: skip
+    for jump in response.jumps:
+        assert jump.after
+        assert max(jump.after) < 0.99 * jump.before
 
 
 def test_a_resonance_at_a_fold_has_a_gradient() -> None:

@@ -240,7 +240,9 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
             if arc.parameter[end] != value or arc.amplitude[end] != amplitude:
                 continue
             beyond: list[Arc] = []
-            for other in (o for o in stable if o.span[0] < value < o.span[1]):
+            # a mirror image ends at the same value
+            near = _ROUNDING * abs(value)
+            for other in (o for o in stable if o.span[0] + near < value < o.span[1] - near):
                 # a motion that was followed twice counts once
                 if not any(other.is_same_curve(known) for known in (arc, *beyond)):
                     beyond.append(other)

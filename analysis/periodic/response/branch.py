@@ -566,6 +566,10 @@ def _special_points(
                 span = " and ".join(family.format_value(p.parameter) for p in (before, after))
                 problems.append(f"the {kind.value} between {span} is not located: {error}")
                 continue
+            # a step onto a branch that crosses, and back, turns the parameter at once: there is no fold
+            ends = np.abs(values[Crossing.FOLD][i : i + 2])
+            if tested is Crossing.FOLD and abs(point.tangent[-1]) > 0.5 * ends.min():
+                continue
             # two real multipliers with the product 1 are not a torus point
             if kind is Crossing.TORUS and abs(torus_pair(point.data.multipliers)[0].imag) < 1e-6:
                 continue
