@@ -273,6 +273,7 @@ def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1] * 4, None, "does not turn"),
         ([[0, 0], [1, 0], [0, 0], [3, 1], [4, 0]], [0.1, 0.2, 0.1, 0.4, 0.5], None, "the same"),
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "give poses without"),
+        ([[1, 0], [0, 1], [-1, 0], [0, -1]], [0.0, 0.5 * pi, pi, 1.5 * pi], None, "only about one point"),
         ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.0, 1e-5, 3e-5, 4e-5], None, "a slide is in its place"),
     ],
 )

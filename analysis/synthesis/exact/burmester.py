@@ -185,7 +185,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     ------
     InputError
         If there are not four or five poses, crank rotations are given, or the poses are degenerate: two poses are the same, or
-        the body does not rotate.
+        the body does not rotate, or only about one point.
 
     Examples
     --------
@@ -267,8 +267,8 @@ _FORMS = _forms()
 
 
 _DEPENDENT_POSES = (
-    "the poses are not independent: two of them are the same, or the body does not turn between them; then there are "
-    "infinitely many dyads. Change a pose, or leave one out"
+    "the poses are not independent: two of them are the same, or the body does not turn between some of them, or only about "
+    "one point; then there are infinitely many dyads. Change a pose, or leave one out"
 )
 
 
