@@ -25,7 +25,7 @@ def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
     ]
     ticks = [0.0, 90.0, 180.0, 270.0, 360.0]
     panels = [
-        Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="outside")
+        Panel(x_label="crank rotation [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="outside")
         for label, curves in parts
     ]
     return plot_curves(panels, title=title, columns=2, size=(4.4, 2.4))

@@ -26,6 +26,8 @@ from analysis.figures.style import GROUND
 from analysis.files import WritingError, save_figure
 from analysis.linkages import linkage
 from analysis.mechanisms import MECHANISMS
+from analysis.numerics.fourier import FourierSeries
+from analysis.slider import inverse_dynamics
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.slider_crank.published import SETS as SLIDER_CRANKS
@@ -190,6 +192,13 @@ def test_a_type_that_has_no_picture_is_named(picture) -> None:
     with pytest.raises(figures.DrawingError, match=r"type dict have no") as refused:
         picture({})
     assert refused.value.kind is dict
+
+
+def test_the_drive_of_a_slider_is_over_the_rotation_of_a_crank_that_turns_either_way() -> None:
+    still = FourierSeries(cos=np.zeros(1), sin=np.zeros(1))
+    axis = figures.plot(inverse_dynamics(TABLE_3_1, still, -44.0)).axes[0]
+    assert axis.get_xlabel() == "crank rotation [deg]"
+    assert 350.0 < axis.lines[0].get_xdata()[-1] < 360.0
 
 
 def test_outputs_to_plot_are_a_list(run) -> None:
