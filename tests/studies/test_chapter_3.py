@@ -141,6 +141,13 @@ class TestLaunch:
         times = [launches.settling(1e8, 1e6, rpm).time for rpm in (780.0, 820.0)]
         assert times[0] == pytest.approx(times[1], rel=1e-5)
 
+    def test_last_distances_from_the_steady_decay(self) -> None:
+        """The known values are by other code, from a free crank that has exactly the mean speed of the launched one."""
+        cases = statement("3.10", "Fig. (3.10) also shows").cases
+        last = [case.computed for case in cases if case.label.endswith("last turn")]
+        assert last == pytest.approx([7.34e-5, 5.0e-8, 1.04e-7], abs=1e-5)
+        assert last == [round(distance, 5) for distance in last]
+
     def test_slider_passes_its_start(self) -> None:
         """After T0 = 1e8 dyn.cm by 0.024684 cm, by Runge-Kutta steps of 0.01 ms; after the strongest launch it does not."""
         tops = {case.label: case.computed for case in statement("3.8", "The three responses").cases}

@@ -1,6 +1,8 @@
 """The figures of chapter V: regions of instability."""
 
+from cmath import phase, rect
 from dataclasses import replace
+from math import radians
 
 import numpy as np
 import pytest
@@ -110,6 +112,16 @@ def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: 
 def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, listed: float, true: float) -> None:
     for of, known in ((appendix_3_region, listed), (orbit_region, true)):
         assert axis(of(with_held_angles(0.8, inertia_ratio))) == pytest.approx(known, abs=5.1e-5)
+
+
+def test_angles_of_the_listing_hardly_change_the_axis() -> None:
+    """The known value is from Lagrange's equation of the slider, integrated with its variation by other code."""
+    crank, coupler, rocker = (rect(length, radians(deg)) for length, deg in ((0.05, 149.0), (0.8, 57.0), (1.0, 120.0)))
+    held = with_held_angles(0.8)
+    ground = held.rocker_length * (crank + coupler - rocker)
+    listed = replace(held, ground_length=abs(ground), slider_guide_angle=-phase(ground))
+    assert axis(orbit_region(listed)) == pytest.approx(1.87496, abs=1e-5)
+    assert axis(orbit_region(listed)) - axis(orbit_region(held)) == pytest.approx(0.002, abs=5e-4)
 
 
 def test_held_angles_need_another_ground_link() -> None:

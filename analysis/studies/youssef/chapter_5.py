@@ -468,8 +468,9 @@ SWEEPS = {
         judge=judge_coupler,
         assignment=(
             "The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
-            "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We also "
-            "vary the coupler on the same ground link."
+            "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We hold 60 and "
+            "120 deg, the angles with B at the crank shaft; the listing has 57 and 120 deg at a crank angle of 149 deg, which "
+            "changes A at sigma3 = 0.8 by 0.002. We also vary the coupler on the same ground link."
         ),
         further={SAME_GROUND: with_same_ground},
     ),
