@@ -55,7 +55,7 @@ class PartTable:
     partner: str = entry(files.Choice(PARTNERS), "")
     controller: str = entry(files.Choice(CONTROLLERS), "")
     fmu: str = entry(files.text, "")
-    values: Mapping[str, Any] = entry(files.as_table, factory=dict)
+    values: Mapping[str, Any] = entry(lambda value, name: files.flatten(files.as_table(value, name)), factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +72,7 @@ def _parts(value: Any, name: str) -> dict[str, PartTable]:
 
 def _connections(value: Any, name: str) -> dict[End, End]:
     ends = {}
-    for target, source in files.as_table(value, name).items():
+    for target, source in files.flatten(files.as_table(value, name)).items():
         pair = []
         for text in (target, files.text(source, f"{name}.{target}")):
             part, dot, port = text.partition(".")

@@ -1,6 +1,7 @@
 """What is wired wrongly gets one sentence, what is perhaps not meant a note; files of SSP come back as they were."""
 
 import os
+import re
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,6 +47,16 @@ def wired(name: str, **connections: str) -> System:
         part, _, port = target.replace("__", ".").partition(".")
         ends[End(part, port)] = End(*source.split(".", 1))
     return replace(system, connections=system.connections | ends)
+
+
+def test_names_need_no_quotation_marks(tmp_path: Path) -> None:
+    """TOML makes tables of names with dots."""
+    text = library()["motor-crank"].read_text(encoding="utf-8")
+    bare = re.sub(r'"([\w.]+\.[\w.]+)" = ', r"\1 = ", text)
+    assert bare != text
+    (tmp_path / "bare.toml").write_text(bare, encoding="utf-8")
+    found, known = load_system(tmp_path / "bare.toml"), system_of("motor-crank")
+    assert (found.parts, found.connections) == (known.parts, known.connections)
 
 
 @pytest.mark.parametrize(
