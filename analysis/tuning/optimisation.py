@@ -280,7 +280,10 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
         if nearer is not None:
             _try_ways(search, nearer, progress)
     if search.best is None:
-        raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
+        raise LinkworkError(
+            f"the motions from {wish.say(*wish.span, joint=' to ')} could not be followed with any change of "
+            f"{', '.join(wish.names)} that was tried: choose a narrower range, or narrower bounds of the changes"
+        )
     return _make_result(search, before, *search.best[1:])
 
 

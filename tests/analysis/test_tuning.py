@@ -530,3 +530,11 @@ def test_the_example_loads():
     assert case.wish.parameters == LIGHT
     with pytest.raises(LinkworkError, match="tune"):
         load_tuning_case(EXAMPLES / "run-up.toml")
+
+
+def test_no_way_that_could_be_followed_names_range_and_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("analysis.tuning.optimisation._Search.keep", lambda *_: None)
+    limits, change = [Limit(output="pin.C", below="9 N")], {"slider.stiffness": "5 %"}
+    wish = Wish(parameters="rig-2-spring-c", speeds=("500 rpm", "510 rpm"), change=change, limits=limits)
+    with pytest.raises(LinkworkError, match=r"500 to 510 rpm .* slider\.stiffness .* narrower"):
+        tune(wish)
