@@ -32,8 +32,8 @@ from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_l
 from .coexistence import Coexistence, coexistence
 from .grid import Grid
 
-#: Steps of the finite differences, relative to the scales, for multipliers that are accurate to about 1e-10. The differences
-#: are used only in Newton's method.
+#: Step of the finite differences of `_evaluate`, relative to the scale of each unknown, for multipliers that are accurate to
+#: about 1e-10. The differences are used only in Newton's method.
 _DIFFERENCE = 1e-7
 
 
@@ -73,11 +73,11 @@ def follow_crossing(
     Parameters
     ----------
     at : callable
-        Mechanism and drive at a point of the plane.
+        Function that returns mechanism and drive at a point of the plane: see `plane`.
     orbit : PeriodicOrbit
         An orbit on the curve, or close to it.
     kind : Crossing
-        Not a branch point.
+        Kind of the points on the curve: fold, period doubling or torus point, not branch point.
     place : (float, float)
         Values of the two parameters for this orbit.
     x, y : (float, float)
@@ -116,7 +116,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     """Return a function that evaluates G = (y(T) - y(0), test) and its derivatives at unknowns (y(0), p) and a parameter q.
 
     p and q are the two parameters of the plane; y(0) and y(T) are the state y of the orbit at the beginning and at the end of
-    the period.
+    the period; test is `crossing_test` of ``kind``. ``scale`` has the scales of y(0) and p.
     """
     n = len(scale) - 1
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
@@ -170,9 +170,9 @@ def line_branches(
     to the limit of assembly, folds and period doublings come in pairs; the ranges of stability between them are too narrow for
     any machine.
 
-    ``name`` and ``unit`` are those of x; ``start`` is that of `coexistence`. ``watch`` is called with the share of the work
-    that is done, from 0 to 1. Return the branches, the motions from which they were followed, and a sentence for each motion
-    that could not be followed.
+    ``name`` and ``unit`` are the name and the unit of x; for ``start`` see `coexistence`. ``watch`` is called with the share of
+    the work that is done, from 0 to 1. Return the branches, the motions from which they were followed, and a sentence for each
+    motion that could not be followed.
     """
     xs = np.linspace(*x, POINTS)
     found = coexistence(operation, xs, [y], start=start)
@@ -210,7 +210,7 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
-    """Return a function of a point of a plane: the monodromy matrix of the periodic orbit of one turn at this point.
+    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
 
     Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
     nearest points of the grid ``near``, then from all starts of `newton_orbit`. Results are cached.
@@ -246,12 +246,12 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
 
 
 def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
-    """Return a test function of a point (x, y) of a plane: the `crossing_test` of the monodromy matrix at the point."""
+    """Return a function that gives the `crossing_test` of the monodromy matrix at a point (x, y) of a plane."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int) -> Test:
-    """Return the test function of the mechanism's periodic orbit over a plane: see `plane_test` and `orbit_monodromy`.
+    """Return the test function of the mechanism's periodic orbit of one turn over a plane: see `plane_test`.
 
     ``multiplier`` is +1 or -1: the test function is zero where a Floquet multiplier of the orbit has this value.
     """

@@ -119,14 +119,14 @@ class TracedBoundary:
         Values of the two parameters along the boundary, in SI.
     motion : str
         The motion that loses stability: `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`, another motion; or the name of a
-        motion given in ``beside``.
+        motion in the argument ``beside`` of `stability_chart`.
     kind : Crossing
         Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; branch point (+1), beyond which it
         exists; or torus (a complex pair on the unit circle).
     ends : (End, End)
         Why the curve ends at its first and at its last point.
     starts : ndarray, shape (n, m), or None
-        y at crank angle 0 of the motions on the boundary, if they were followed.
+        State y at crank angle 0 of the motion at each point; None if the boundary was traced by a test function alone.
     """
 
     points: NDArray[np.float64]
@@ -157,7 +157,8 @@ class StabilityChart(NotebookResult):
     grid : Grid
         Largest Floquet multiplier of the mechanism's own orbit, called the true orbit, at each point.
     boundaries : tuple of TracedBoundary
-        Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
+        Boundaries of the true orbit, of other motions, and of the motions that `stability_chart` was given in its argument
+        ``beside``.
     removals : tuple of str
         One sentence for each region of instability: the damping that removes it. Empty unless one of the axes is the damping.
     runs : tuple of Run
@@ -478,7 +479,10 @@ class _Survey:
         self.problems += [f"{what} is followed to {self.place(*end.point)} only: {end.message}" for end in lost]
 
     def _trace_multiplier(self, special: SpecialPoint, place: tuple[float, float], what: str) -> None:
-        """Trace, by a test function, the boundary of the grid's motion through a special point."""
+        """Trace, by a test function, the boundary of the grid's motion through a special point.
+
+        ``what`` names the point in a message.
+        """
         try:
             found = trace(plane_test(self.matrix(), special.kind), place, self.box)
         except LinkworkError as error:
@@ -518,7 +522,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """Return a sentence for each region of instability on the damping that removes it; empty if no axis is the damping."""
+        """Return a sentence for each region of instability: which damping removes it. Empty if no axis is the damping."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -530,7 +534,10 @@ class _Survey:
         )
 
     def _removal(self, matrix: Monodromy, boundary: TracedBoundary, which: int) -> str:
-        """Return a sentence on the damping, varied along axis ``which``, that removes the region within a boundary."""
+        """Return a sentence that tells which damping removes the region within a boundary.
+
+        ``which`` is the index of the axis along which the damping varies; ``matrix`` gives the monodromy matrix at a point.
+        """
         other, up = self.axes[1 - which], self.axes[which]
         spans = (self.box.x, self.box.y)
         across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
@@ -596,8 +603,8 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
     """Return the default range of the parameter ``name`` on an axis of a chart, in SI.
 
-    The range of a crank speed lies around the natural frequency of the only spring, if there is one (`natural_frequency`). The
-    range of another parameter, or of the speed of another mechanism, lies around the present value.
+    The range of a crank speed lies around the natural frequency, if `natural_frequency` can compute it. Any other range lies
+    around the present value.
 
     Raises
     ------
@@ -621,7 +628,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 def damping_name(mechanism: Mechanism) -> str:
     """Return the FMI name of the damping that is an axis of a chart by default.
 
-    It is the damping of the first degree of freedom other than the crank; if there is none, another damping.
+    It is the damping of the first degree of freedom other than the crank; if this has no damping, another damping.
 
     Raises
     ------

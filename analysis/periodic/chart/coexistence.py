@@ -37,10 +37,12 @@ STARTS = 16
 _TOGETHER = 4
 #: Samples of a turn from which an amplitude is computed.
 SAMPLES = 64
-#: For basins: greatest distance from a motion at which a start has settled on it, relative to the scale and to the distance of
-#: the nearest other motion; bound of the integrator's local error relative to this distance; turns at most.
+#: For basins: distance from a motion below which the mechanism has settled on this motion, relative to the scale, and the same
+#: relative to the distance of the nearest other motion; bound of the integrator's local error, relative to the least of these
+#: distances; greatest number of turns.
 _NEAR, _APART, _TOLERANCE, _TURNS = 1e-2, 0.2, 1e-4, 3000
-#: Growth per period of the deviations whose distances `_measures` weighs down, so that it measures without damping, too.
+#: Number by which `_measures` divides the monodromy matrices: deviations then decay even without damping, and the quadratic
+#: form exists.
 _GROWTH = 1.001
 #: Default plane of basins: its width relative to the range of the motions, and the range relative to the scale below which a
 #: coordinate counts as at rest.
@@ -142,10 +144,10 @@ def coexistence(
     """Find all periodic motions of one turn at every point of a grid over two parameters.
 
     Newton's method starts from the motions of the neighbouring point in the row, then from `STARTS` guesses, with the known
-    motions divided out. Where the indices of the motions do not add up, the motions of the points around are tried, too. A
-    motion that exists only in a short part of a row may still be missed; `find_orbits` searches a point closely. An undriven
-    link that has a ratio in the drive goes round in all these motions; any other undriven link only swings. `find_orbits` finds
-    motions of both kinds. The rows are distributed over workers and kept as in `grid`.
+    motions divided out. Where the sum of the indices shows that a motion is missing, the search starts from the motions of the
+    neighbouring points, too. A motion that exists only in a short part of a row may still be missed; `find_orbits` searches a
+    point closely. An undriven link that has a ratio in the drive goes round in all these motions; any other undriven link only
+    swings. `find_orbits` finds motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------
@@ -162,7 +164,7 @@ def coexistence(
     Raises
     ------
     InputError
-        If an axis is empty or not finite, or there are no cores.
+        If an axis is empty or not finite, or ``n_jobs`` is not usable.
     ParameterError
         If a text on an axis is not a quantity.
     GridInterrupted
@@ -230,14 +232,14 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
 
 
 def _indices(data: FloatArray) -> NDArray[np.int64]:
-    """Return the sum of the indices of the motions at each point; ``data`` are the rows by `_compute_motions`."""
+    """Return the sum of the indices of the motions at each point; ``data`` is the result of `_compute_motions`."""
     return np.nansum(data[..., 2], axis=2).astype(np.int64)
 
 
 def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data: FloatArray, whole: int) -> None:
-    """Add motions to points whose indices do not add up to ``whole``, sought from the motions of the points around them.
+    """Add motions to points whose indices do not add up to ``whole``, sought from the motions of neighbouring points.
 
-    A point around must have more motions, or indices that add up; those are tried that are nearest to no known motion.
+    A neighbouring point is used if it has more motions than the point itself, or if its own indices add up to ``whole``.
     """
     # points whose motions have not been tried at the points beside them
     fresh = np.ones(data.shape[:2], dtype=bool)
@@ -255,9 +257,10 @@ def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data
 
 
 def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, whole: int) -> bool:
-    """Add motions to those of a point, sought from starts beside its own, until the indices add up to ``whole``.
+    """Add motions to a point, sought from the motions ``starts`` of a neighbour, until the indices add up to ``whole``.
 
-    Return whether a motion was added. ``into`` is the point's part of the result of `_compute_motions`.
+    For each motion of the point, the nearest of ``starts`` is skipped: it is probably the same motion. Return whether a motion
+    was added. ``into`` is the point's part of the result of `_compute_motions`.
     """
     count = before = int(np.isfinite(into[:, 0]).sum())
     away = np.abs(point.flow.remove_turns(into[:count, None, 3:] - starts) / point.scale(starts[0])).max(axis=2)
@@ -337,8 +340,8 @@ class Basins(NotebookResult):
     def fixed(self) -> tuple[str, ...]:
         """FMI names of the coordinates and rates that are the same at all starts, those of the first motion.
 
-        A motion that differs from the first motion only in these may not be reached: a pendulum exactly at rest begins to swing
-        only because of rounding errors.
+        A motion that differs from the first motion only in these components may not be reached: a pendulum exactly at rest
+        begins to swing only because of rounding errors.
         """
         plane = [name for name, _ in self._components()]
         return tuple(name for name, _ in self.motions[0].flow.components if name not in plane)
@@ -396,8 +399,8 @@ def basins(
     Raises
     ------
     InputError
-        If the drive is not a `Drive`, there is no stable motion or no such coordinate, a range does not increase, or there are
-        no cores.
+        If the drive is not a `Drive`, there is no stable motion or no such coordinate, a range does not increase, or ``n_jobs``
+        is not usable.
     ParameterError
         If a range is not two quantities, or ``points`` is not a whole number.
     GridInterrupted
@@ -461,9 +464,10 @@ def basins(
 def _measures(point: OperatingPoint, found: Orbits) -> FloatArray:
     """Return a matrix for each passage of the stable motions at crank angle 0, shape (k, n, n): see `kernels.settle_starts`.
 
-    The distance from a motion is measured by Lyapunov's quadratic form, which falls from period to period. It is that of the
-    scale in the direction in which the form is least. A position and a rate may be equally far by the scale of y, while a free
-    vibration much slower than the crank has one for an amplitude of a hundred times the other.
+    The distance from a motion is measured by Lyapunov's quadratic form, which falls from period to period. In the direction in
+    which the form is least, the distance equals that in units of the scale of y. The scale alone is no measure: if a free
+    vibration is much slower than the crank, equal deviations of position and of rate, in units of the scale, may cause
+    amplitudes of which one is a hundred times the other.
     """
     passed, measures = [orbit.passages() for orbit in found.orbits], []
     scale, unit = point.scale(passed[0][0]), np.eye(point.flow.size)
@@ -548,7 +552,7 @@ def _ends(
     across: FloatArray,
     rates: Sequence[float],
 ) -> FloatArray:
-    """Return for each start an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
+    """Return for each start the index in ``known`` of the motion on which the mechanism settles, or LOST or UNSETTLED.
 
     Each start is the start of the first known motion, but with a value of ``across``, shape (points,), for the coordinate with
     the index ``place`` in y, and with a value of ``rates`` for its rate, which is the same in a row. ``measures`` are those of

@@ -195,7 +195,7 @@ def grid(
     Raises
     ------
     InputError
-        If an axis is empty or not finite, or there are no cores.
+        If an axis is empty or not finite, or ``n_jobs`` is not usable.
     ParameterError
         If the parameters at a point are not valid, or a text on an axis is not a quantity.
     GridInterrupted
@@ -356,8 +356,8 @@ def row_code(*functions: Any) -> tuple[str, ...]:
 def row_name(row: PointRow, guesses: FloatArray, functions: Sequence[int], code: Sequence[str], *numbers: float) -> str:
     """Return the name of a row in the cache: a hash of all that the row depends on.
 
-    ``guesses`` are guesses of y, shape (k, n); ``functions`` the indices of the flow's functions that are called; ``code`` is
-    that of `row_code`; ``numbers`` are further numbers that the row depends on.
+    ``guesses`` are guesses of y, shape (k, n); ``functions`` are the indices of the flow's functions that are called; ``code``
+    is the result of `row_code`; ``numbers`` are further numbers that the row depends on.
     """
     flow, bound = row.flow, row.flow.mechanism.greatest_rotation
     digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=row.switched), *code)).encode())
@@ -381,10 +381,10 @@ def compute_rows(
 ) -> tuple[FloatArray, int]:
     """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
 
-    ``work`` computes up to ``together`` items; its result has a row of the given ``shape`` for each of them. ``names`` are
-    those of the items in the cache: see `row_name`. ``kernel`` is compiled once, before the workers start. The other arguments
-    and the exceptions are those of `grid`. The result has the shape (items, *shape); with it comes the number of rows that
-    were not in the cache.
+    ``work`` computes up to ``together`` items; its result has a row of the given ``shape`` for each of them. ``names`` are the
+    names of the items in the cache: see `row_name`. ``kernel`` is compiled once, before the workers start. The other arguments
+    and the exceptions are those of `grid`. The result has the shape (items, *shape). The number of rows that were not in the
+    cache is returned, too.
     """
     check_jobs(n_jobs)
     where = grid_folder() if folder is None else Path(folder)
@@ -425,7 +425,7 @@ def compute_rows(
     return np.array([rows[path] for path in paths]), len(missing)
 
 
-#: Least margin with which a long run distinguishes growth from decay with certainty.
+#: Least margin of stability with which a long run distinguishes growth from decay with certainty.
 MEASURABLE = 1e-2
 
 

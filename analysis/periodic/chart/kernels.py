@@ -111,9 +111,9 @@ def point_section(section, points, row, tolerance):
 def divide(section, search, level, start, path, desk, room):
     """Find an orbit by collocation with the least number of elements in `COUNTS` that suffices.
 
-    ``level`` is the first index into `COUNTS` to try. Return the index of the number that suffices, or -1, and the relative
-    size of the highest Legendre coefficients. ``start`` is a guess of y at crank angle 0. ``path`` = (y, w) receives y at the
-    beginning of each element, and the slopes w.
+    ``level`` is the first index into `COUNTS` to try. Return the index of the number that suffices, or -1 if none does, and the
+    relative size of the highest Legendre coefficients. ``start`` is a guess of y at crank angle 0. ``path`` = (y, w) receives y
+    at the beginning of each element, and the slopes w.
     """
     y, w = path
     while level < len(COUNTS):
@@ -323,7 +323,7 @@ class Seekers(NamedTuple):
 
     In each row one point is searched after the other, in waves: from the motions of the previous point, then from every guess,
     then again from the guesses that led to a motion, until a wave finds nothing new. Only motions that were known before a wave
-    are divided out in it, so that its results do not depend on the order in which its searches end.
+    are divided out during this wave, so that its results do not depend on the order in which its searches end.
     """
 
     row: NDArray[np.int64]  # row of a lane's search, -1 if the lane is free
@@ -377,7 +377,10 @@ class Job(NamedTuple):
 
 @part
 def _record(at, end, job, carry):
-    """Add a motion, given by its start and monodromy matrix ``end``, to the motions found at point ``at``, if it is new."""
+    """Add a motion to the motions found at the point with the index ``at``, if it is new.
+
+    ``end`` is the start of the motion, followed by its monodromy matrix.
+    """
     found, count, n = job.found, job.found.counts[at], job.guesses.shape[1]
     own = point_section(job.section, job.points, at, job.section.tolerance)
     z = end[:n].copy()
@@ -398,7 +401,7 @@ def _record(at, end, job, carry):
 
 @inner
 def _pass_start(row, seekers):
-    """Go to the next start of a row's wave from which there is a search."""
+    """Go to the next start in a row's wave from which a search is to begin."""
     seekers.following[row] += 1
     while seekers.following[row] < seekers.todo.shape[1] and not seekers.todo[row, seekers.following[row]]:
         seekers.following[row] += 1
@@ -463,7 +466,7 @@ def _take_search(lane, job, seekers, v):
 
 @inner
 def _continue_search(lane, job, seekers, v, carry):
-    """Continue the search of a lane after its integration: with the next integration, or with an end of the search."""
+    """Continue the search of a lane after its integration: begin the next integration, or end the search."""
     hunt, most, status = _hunt(lane, seekers.hunts), job.search.most, v.status[lane]
     row, place = seekers.row[lane], seekers.place[lane]
     at, n = row * job.columns + seekers.point[row], job.guesses.shape[1]
@@ -603,7 +606,8 @@ def settle_starts(section, turn, most, starts, known, measures, ends):
         The motion has settled on a known motion if its difference from the known start, multiplied by this matrix, is shorter
         than 1.
     ends : ndarray of int64, shape (m,)
-        The result, written: for each start the index of the known motion, or `LOST` or `UNSETTLED`.
+        The result, written: for each start the index of the known motion on which the mechanism settles, or `LOST` or
+        `UNSETTLED`.
     """
     tables = make_tracks(section, 0)
     for lane in range(LANES):

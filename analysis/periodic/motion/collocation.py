@@ -47,8 +47,8 @@ TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
 #: the ends of the elements is about the square of that size.
 DECAY = 200.0
 #: Half the widest distance of two nodes on an element of length 1. At the nodes the clearance to the limit of assembly must
-#: exceed it, times the length of the elements (rad): between them the clearance is then above zero, if it changes by 1 per
-#: radian at most.
+#: exceed BETWEEN times the length of the elements (rad): between the nodes the clearance is then above zero, if it changes by 1
+#: per radian at most.
 BETWEEN = 0.5 * float(np.diff(C).max())
 #: Greatest number of corrections, and greatest size of the first correction relative to the scale: a larger one means that the
 #: motion is not a neighbour.
@@ -94,7 +94,7 @@ def row_count(elements):
 def make_desk(section, most, directional):
     """Return the work space for the motions of a flow and up to ``most`` elements.
 
-    ``directional`` tells whether the work space has room for derivatives with respect to lambda.
+    ``directional`` tells whether the work space has room for derivatives with respect to a parameter lambda.
     """
     n = section.scale.shape[0]
     f, columns = n // 2, n + 1 if directional else n
@@ -536,7 +536,7 @@ class PieceSolution(NamedTuple):
 
 @inner
 def _predict(firsts, starts, change, unit, neighbour, desk):
-    """Extrapolate a neighbouring motion, in place, to other states at the beginnings of the pieces and another lambda.
+    """Extrapolate a neighbouring motion, in place, to the states ``starts`` at the beginnings of the pieces and another lambda.
 
     The extrapolation is of first order; ``change`` is the change of lambda.
     """

@@ -39,7 +39,7 @@ from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
 from .kernels import Section, Status
 
 FloatArray = NDArray[np.float64]
-#: Bound of the local error of a step; the solution is good to about a hundred times as much.
+#: Bound of the local error of a step; the error of the solution is about a hundred times as large.
 INTEGRATOR_TOLERANCE = 1e-12
 #: Growth of a deviation over a period, or over one of its pieces, above which the period is divided into (more) pieces; growth
 #: wanted over each piece; number of crank angles in a turn from which the ends of the pieces are chosen.

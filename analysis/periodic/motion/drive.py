@@ -36,7 +36,7 @@ from ...run import (
 from ...units import Amount, in_si
 from .flow import PLAIN, Crank, Flow, find_crank, find_turning_freedom, flow
 
-#: Size below which two quantities are rounding errors: relative change of accelerations by a turn, error of a ratio of turns.
+#: Value below which a relative change of accelerations by a turn, or an error of a ratio of turns, counts as a rounding error.
 _NO_SPRING = 1e-7
 #: Advice in messages about a negative speed.
 _MIRROR = (
@@ -287,7 +287,7 @@ class Drive:
         UnknownNameError
             If a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the name of a torque.
         InputError
-            If a force does not act, or if ``held`` names a coordinate that is not held.
+            If a force has no effect in this drive, or if ``held`` names a coordinate that is not held.
         """
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
@@ -589,10 +589,12 @@ SAME = 1e-6
 _WIDEST, _WIDER = 16.0, 1.25
 #: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor above.
 _ONE_SIDED = 1.3
-#: Greatest free vibrations per turn of the crank at the widest starts, unless those of small amplitudes are half as fast; for a
-#: coupled body, also the greatest speed that the spring of its coupling gives it, relative to the crank.
+#: Greatest number of free vibrations per turn of the crank at the widest starts, or twice the number at small amplitudes if
+#: that is greater; for a coupled body, also the greatest speed, relative to the crank, that the spring of its coupling gives
+#: it.
 _FASTEST = 30.0
-#: Ratio of the largest ellipse of starts to the smallest, for motions much smaller than the room that the links have.
+#: Ratio of the largest ellipse of starts to the smallest: the smallest are for motions much smaller than the room that the
+#: links have.
 _DEPTH = 1024.0
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
@@ -661,8 +663,8 @@ def start_ranges(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the bounds of `assembly_ranges`, reduced to where free vibrations are not too fast: see `_FASTEST`.
 
-    Under a spring that becomes much stiffer there are no periodic motions far away, and integrations from there take very long,
-    as they do where the spring of a coupling is wound up so far that it turns the body beyond it many times per turn.
+    Where a spring has become much stiffer, there are no periodic motions, and integrations take very long. They also take long
+    where the spring of a coupling is wound up so far that it turns the coupled body many times per turn of the crank.
     """
     mechanism, p = find_mechanism(parameters), parameters.constants()
     flow, vector, constants = drive.flow(mechanism), drive.vector(mechanism), np.array(p)

@@ -403,7 +403,7 @@ def label(variable: Variable) -> str:
 
 @cache
 def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1, commons: int = 1) -> Flow:
-    """Return the `Flow` with these parameters; the flow is built at the first call and then cached."""
+    """Return the `Flow` with these parameters (see the class); it is built at the first call and then cached."""
     return Flow(mechanism, modes, crank, base, commons)
 
 

@@ -56,8 +56,8 @@ class Status(IntEnum):
 
 # the statuses as plain integers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-#: Least step of the integrator (rad), and the greatest number of steps per turn of the crank, without which a start near a
-#: singular position, such as a slide at the pin of its guide, would take for ever.
+#: Least step of the integrator (rad), and the greatest number of steps per turn of the crank: without it the integration from a
+#: start near a singular position, such as a slide at the pin of its guide, would not end.
 LEAST_STEP, MOST_STEPS = 1e-12, 50000
 #: Message for each status that is a failure.
 REASONS = {
@@ -106,7 +106,7 @@ def replace_numbers(section, drive, p, scale, tolerance):
 
 @inner
 def write_mechanism(lane, section, work):
-    """Write the modes, the drive and the constants of a section into one lane of those of a work space in lanes."""
+    """Write the modes, the drive and the constants of a section into one lane of the work space ``work``."""
     write_lane(lane, LANES, section.modes, work.modes)
     write_lane(lane, LANES, section.drive, work.drive)
     write_lane(lane, LANES, section.p, work.p)
@@ -144,8 +144,8 @@ def _clearance(section, angle, z, room):
 def passes_kink(section, error, h, z, y, k, sizes, tolerance, lane, lanes):
     """Return whether the least step may be taken from z to y although its error is too large.
 
-    Where the force of a law has a kink, as at a stop, the rates of the columns of derivatives jump: their error falls in
-    proportion to the step only. The state itself must be accurate. ``error`` is relative to the tolerance.
+    Where the force of a law has a kink, as at a stop, the rates of the columns of derivatives jump: the error of these columns
+    falls only in proportion to the step. The state itself must be accurate. ``error`` is relative to the tolerance.
     """
     n = section.scale.shape[0]
     if not error < _KINK or z.shape[0] == n * lanes:
@@ -155,13 +155,13 @@ def passes_kink(section, error, h, z, y, k, sizes, tolerance, lane, lanes):
 
 @inner
 def most_steps(way):
-    """Return the greatest number of steps over a crank angle (rad), which is that of a turn for less than a turn."""
+    """Return the greatest number of steps over a crank angle (rad): for less than a turn, the number for a whole turn."""
     return MOST_STEPS * max(1.0, way / (2.0 * np.pi))
 
 
 @inner
 def _bounded_size(section, size, angle, z, room):
-    """Shorten a step size until the step passes over no force and no limit of assembly.
+    """Shorten a step size until the step skips no force that acts over a short way only, and no limit of assembly.
 
     ``room.gap`` has the clearance at z, and ``room.k[0]`` the rates of z.
     """

@@ -189,7 +189,7 @@ class Turn:
 
 
 def _is_sharp(samples: FloatArray, rounding: float) -> bool:
-    """Return whether the highest harmonics of samples over a period are not negligible, nor rounding errors."""
+    """Return whether the highest harmonics of samples over a period are neither negligible nor rounding errors."""
     size = np.abs(np.fft.rfft(samples))[1:] * (2.0 / len(samples))
     return bool(size[3 * len(size) // 4 :].max() > max(_SHARP * size.max(), rounding))
 
@@ -316,7 +316,7 @@ class PeriodicOrbit(NotebookResult):
         return multipliers(self.monodromy)
 
     def distance(self, start: FloatArray) -> float:
-        """Return the greatest difference of a start y from that of this orbit, relative to the scale, without whole turns."""
+        """Return the greatest difference of a start y from this orbit's start, relative to the scale, without whole turns."""
         return float((np.abs(self.flow.remove_turns(start - self.start)) / self.scale).max())
 
     @property
@@ -325,7 +325,7 @@ class PeriodicOrbit(NotebookResult):
         return float(abs(self.multipliers[0]))
 
     def verdict(self, tolerance: float = TOLERANCE) -> StabilityVerdict:
-        """Return the verdict on stability: whether small deviations die out, and with what margin; see `floquet.verdict`."""
+        """Return the verdict on stability: whether small deviations die out, and with what margin; see `flow.verdict`."""
         return verdict(self.multipliers, tolerance)
 
     def sample(self, angles: ArrayLike) -> FloatArray:

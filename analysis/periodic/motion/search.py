@@ -242,7 +242,8 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
 
 #: Number of starts of each of the two methods in a round, and greatest number of rounds.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
-#: Number of starts in a round from which Newton's method fails and the motion is followed instead, and turns at most.
+#: Greatest number of starts in a round from which the motion is followed because Newton's method fails; greatest number of
+#: turns.
 _FOLLOWED, _TURNS = 8, 50
 #: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4
@@ -302,7 +303,7 @@ class Orbits(NotebookResult):
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return the end of an error message, which tells which motions with links that go round were not sought.
+    """Return the end of an error message: which motions, in which links go round, were not sought.
 
     The result is empty if no link can go round.
     """
@@ -598,7 +599,7 @@ class _FoundMotions:
             return False
 
     def follow(self, place: FloatArray) -> None:
-        """Search from the state in which the mechanism is some turns after a start: stable motions have wide basins."""
+        """Follow the mechanism from a start for some turns, and search from there: stable motions have wide basins."""
         status, start = settle_motion(self.point, place, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=_TURNS)
         if status is Status.DONE:
             self.seek(start, divide=False)
@@ -645,7 +646,8 @@ def _reached_motion(
     The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's
     method found from the first guess, or None. If no motion is stable, or if a link may go round and no stable motion is near,
     ``first`` is returned. If no motion is stable and ``first`` is None, the result is the motion of the smallest amplitude.
-    Without damping the machine settles on no motion: ``first`` is returned if it is marginal, else the smallest such motion.
+    Without damping the machine settles on no motion: ``first`` is returned if it is marginal, else the marginal motion of the
+    smallest amplitude.
     """
     stable = found.stable
     if not stable:

@@ -148,7 +148,7 @@ def _evaluate_gap(section, node, v):
 
 @inner
 def _choose_sizes(section, v):
-    """Compute the rates in all lanes, and choose the step of each lane, which passes over no force and no limit of assembly."""
+    """Compute the rates in all lanes, and choose the step of each lane, as `kernels._bounded_size` does in one lane."""
     n = section.scale.shape[0]
     _rates(section, 0, v.x, v)
     for lane in range(LANES):

@@ -37,7 +37,7 @@ _SAME, _NOISE = 1e-2, 1e-7
 #: Relative rounding error of the parameter; share of the range below which an interval does not count: such a short interval
 #: arises because a doubled branch begins a step beyond its doubling.
 _ROUNDING, _SLIVER = 1e-6, 1e-4
-#: Amplitude, relative to the scale, at the end of a branch beyond which nothing limits a resonance.
+#: Amplitude at the end of a branch, relative to the scale, above which the resonance counts as unlimited.
 _UNBOUNDED = 10.0
 FloatArray = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -295,7 +295,7 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 
 
 def _grows_towards(arc: Arc, low: float, high: float) -> bool:
-    """Return whether an arc ends at ``low``, or begins at ``high``, because its amplitude grows beyond all links."""
+    """Return whether an arc ends at ``low``, or begins at ``high``, because its amplitude grows without limit."""
     size = np.abs(arc.amplitudes / arc.scale[: arc.amplitudes.shape[1]]).max(axis=1)
     ends = [(arc.cut[0], arc.span[0] == high, size[0]), (arc.cut[1], arc.span[1] == low, size[-1])]
     return any(meets and not cut and last == size.max() > _UNBOUNDED for cut, meets, last in ends)
@@ -421,8 +421,9 @@ def _locate_extremum(branch: Branch, point: int, sign: int, coordinate: int) -> 
     """Find an extremum of a coordinate's amplitude; return the value of the parameter, and the motion there.
 
     The search starts from the motion with the index ``point`` on the branch, and stays between the values of the parameter at
-    its neighbours. If the parameter turns back there, the extremum lies beside the fold, often too near to be told from
-    the fold. The result is None if there is no fold, as at a branch point. ``sign`` is +1 for a maximum, -1 for a minimum.
+    its neighbours. If the parameter turns back there, the extremum lies beside a fold, often too near to be told from the fold:
+    the result is then the fold, or None if there is no fold, as at a branch point. ``sign`` is +1 for a maximum, -1 for a
+    minimum.
     """
     family, orbit, begin = branch.family, branch.orbits[point], float(branch.parameter[point])
     a, c = sorted((float(branch.parameter[point - 1]), float(branch.parameter[point + 1])))

@@ -34,7 +34,7 @@ from ..stability.nonlinear import SpecialPoint
 #: First step along a branch in scaled arc length; greatest step while the parameter hardly changes; angle between the tangents
 #: of two points (rad) up to which steps grow: 0.04 gives about 150 points on a full circle.
 _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
-#: Distance of a multiplier, or of the product of two, from 1 below which it is rounding.
+#: Distance of a multiplier, or of the product of two multipliers, from 1 below which the distance is a rounding error.
 _AT_CROSSING = 1e-8
 #: Greatest distance of the first motion of a branch from the point at which it begins, relative to the range and to the scale.
 BEGINNING = 0.05
@@ -44,8 +44,8 @@ _BEGINNINGS = {
     Crossing.PERIOD_DOUBLING: (2, (2e-3, 8e-3, 5e-4, 3.2e-2)),
     Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),
 }
-#: A branch ends when the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or when its largest
-#: multiplier passes this value.
+#: A branch ends when the clearance to the limit of assembly (a sine, as `LIMIT_SINE`) falls below the first value, or when its
+#: largest multiplier exceeds the second.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 
@@ -265,7 +265,7 @@ def switch(
         See `follow`.
     special : SpecialPoint
     side : float
-        +1 or -1: the side of a branch point, which a branch leaves on both.
+        +1 or -1: direction in which the new branch is followed; it leaves a branch point in both directions.
     largest : float
         The branch ends when its largest multiplier passes this value.
 
@@ -480,7 +480,7 @@ def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _test_value(point: Point, kind: Crossing, sign: float = 1.0) -> float:
-    """Return ``sign`` times a test function: the parameter's change along the branch for a fold, otherwise `crossing_test`."""
+    """Return ``sign`` times a test function: the parameter's change along the branch for a fold, `crossing_test` for others."""
     return sign * float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
 
 
@@ -496,9 +496,10 @@ def _test_values(points: Sequence[Point]) -> dict[Crossing, NDArray[np.float64]]
 def _insert_dips(curve: Curve, follower: Follower) -> Curve:
     """Insert points where a test function passes zero and comes back within one step, as in a narrow unstable window.
 
-    Such a function has one sign at both ends of the step. If its absolute value is convex, it lies above the lines through the
-    two points before and the two points behind; if these lines meet below zero, the function is minimised. The first and the
-    last step have no such lines.
+    Such a function has the same sign at both ends of the step. If its absolute value is convex, it lies above two straight
+    lines: one through the beginning of the step and the point before, the other through the end of the step and the point
+    after. If these lines meet below zero, the least absolute value is computed. The first and the last step lack one of the
+    lines.
     """
     points, steps = [*curve.points], [*curve.steps]
     if len(steps) < 3:
@@ -616,8 +617,8 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
     """Return whether a branch passes through a motion, apart from whole turns of links.
 
-    ``motion`` is the start of the motion and ``value`` the value of the family's parameter; ``width`` is the scale of this
-    parameter.
+    ``motion`` is the start of the motion, and ``value`` the value of the family's parameter at the motion; ``width`` is the
+    scale of this parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     sizes = motion_sizes(branch.orbits[0], branch.amplitudes.max(axis=0))
@@ -629,6 +630,6 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
 
 
 def has_motion(branches: Iterable[Branch], orbit: PeriodicOrbit, value: float, width: float) -> bool:
-    """Return whether one of the branches passes a motion, at whichever turn of its period the motion is taken to begin."""
+    """Return whether one of the branches passes through a motion, which may be taken to begin at any turn of its period."""
     starts = orbit.passages()
     return any(passes(b, value, start, width) for b in branches if b.turns == orbit.turns for start in starts)

@@ -68,7 +68,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
 
 
 def free_position_name(mechanism: Mechanism, stiffness: str) -> str:
-    """Return the FMI name of the position at which the spring with the named stiffness is free; empty if this is always 0."""
+    """Return the FMI name of the position where a spring with the named stiffness exerts no force; empty if always 0."""
     owner = stiffness.rpartition(".")[0] + "."
     return next((name for name in mechanism.names("spring") if name.startswith(owner)), "")
 
@@ -77,7 +77,8 @@ def free_position_name(mechanism: Mechanism, stiffness: str) -> str:
 def mean_effective_mass(parameters: Parameters) -> float:
     """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
 
-    This degree of freedom is held where its spring is free, or at 0 if it has none. For a five-bar it is the mean of m22.
+    This degree of freedom is held where its spring exerts no force, or at 0 if `stiffness_name` finds no spring. For a five-bar
+    the result is the mean of m22.
 
     Raises
     ------
@@ -114,16 +115,16 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency (rad/s) of the only degree of freedom that is not a crank, from its mean effective mass.
 
-    Only the spring of this degree of freedom counts, such as ``slider.stiffness``. The mass is the mean over a turn with the
-    coordinate where this spring is free; gravity and all other forces are ignored. `analysis.linear.natural_modes` computes the
-    natural frequencies of every mechanism about its equilibrium.
+    Only the spring of this degree of freedom counts, such as ``slider.stiffness``. The mass is the mean over a turn while the
+    coordinate is held where this spring exerts no force; gravity and all other forces are ignored.
+    `analysis.linear.natural_modes` computes the natural frequencies of every mechanism about its equilibrium.
 
     Raises
     ------
     ParameterError
         If there is no spring; or if there are other springs or further degrees of freedom, on which the frequency depends.
     AssemblyError
-        If the crank cannot make a turn with this degree of freedom held there.
+        If the crank cannot make a turn while the coordinate is held.
 
     Examples
     --------
@@ -156,8 +157,8 @@ def natural_frequency(parameters: Parameters) -> float:
     return sqrt(spring / mean_effective_mass(parameters))
 
 
-#: Largest multiplier up to which a motion of several turns is followed, unless its branch begins at a motion of one turn. By
-#: then there was another period doubling or a fold, and a machine has changed to another motion.
+#: Largest multiplier up to which a motion of several turns is followed, unless its branch begins at a motion of one turn.
+#: Before a multiplier has grown so far, another period doubling or a fold occurs, and a machine changes to another motion.
 GREATEST_OF_SEVERAL = 100.0
 
 
@@ -231,7 +232,7 @@ class Response(NotebookResult):
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
-        """Return the local minima of the amplitudes of all free coordinates, as `maxima` does the maxima."""
+        """Return the local minima of the amplitudes of all free coordinates, sorted by parameter; see `maxima`."""
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
@@ -460,7 +461,11 @@ class _Search:
             self.problems.append(f"no motion of twice the period was found near {', '.join(without)}")
 
     def follow_branch_points(self, branches: list[Branch]) -> None:
-        """Follow the branches that cross ``branches`` where a motion is stable, and those that cross these; add them to it."""
+        """Follow the branches that leave ``branches`` at branch points, then the branches that leave the new branches.
+
+        The new branches are added to the list. Only branch points count next to which a motion of the branch is stable or
+        marginal.
+        """
         failed: list[tuple[SpecialPoint, str]] = []
         for branch in branches:
             for special, side in product(branch.special, (1.0, -1.0)):
@@ -503,7 +508,7 @@ class _Search:
         return sum(any(map(is_same, branch.special)) for branch in branches if branch.turns == orbit.turns)
 
     def seek(self, value: float, turns: int) -> None:
-        """Find the motions of ``turns`` turns at a value of the parameter; follow those that lie on no known branch."""
+        """Find the motions of ``turns`` turns at a value of the parameter; follow each motion that lies on no known branch."""
         parameters, drive = self.family.operation(value)
         start = None
         if not drive.speed_drive:
@@ -562,8 +567,8 @@ def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
     )
 
 
-#: Distance of two values of the parameter, relative to the range, at which branches pass one special point; its square root is
-#: that of their motions, relative to the scale.
+#: Distance of two special points in the parameter, relative to the range, below which they are the same point; its square root
+#: is the distance of their motions, relative to the scale, below which they are the same.
 _SAME_POINT = 1e-6
 
 

@@ -53,9 +53,9 @@ class SpecialPoint:
     after: int
 
 
-#: Step of the finite differences, relative to the scale of y; relative uncertainty of the result below which it is no longer
-#: halved; halvings at most. The map over many turns may bend within a thousandth of the scale, near the limit of assembly
-#: within a millionth.
+#: Step of the finite differences, relative to the scale of y; relative uncertainty of the result below which the step is no
+#: longer halved; greatest number of halvings. The map over many turns may bend within a thousandth of the scale, near the limit
+#: of assembly within a millionth.
 _STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
 #: Distance of the multiplier from the crossing of the unit circle up to which the point counts as located: next to the limit of
 #: assembly the multiplier may change from -1 to 1 within the rounding error of the parameter.
@@ -248,12 +248,13 @@ def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float
     return float(p @ (forms.third_form(q, h) + 3.0 * mixed)) / 6.0
 
 
-#: Quadratic coefficient, relative to the root of the cubic one, above which a branch point is transcritical: zero by symmetry.
+#: Quadratic coefficient, relative to the root of the cubic coefficient, above which a branch point is transcritical; symmetry
+#: makes the quadratic coefficient zero.
 _QUADRATIC = 1e-2
 
 
 def _is_transcritical(forms: Forms, cubic: float) -> bool:
-    """Return whether the map at a branch point has a quadratic coefficient, so that the branch goes on on both sides."""
+    """Return whether the map at a branch point has a quadratic coefficient: the crossing branch then exists on both sides."""
     whole, half = (form_coefficient(forms, Crossing.FOLD, 1.0, h) for h in (_STEP, 0.5 * _STEP))
     return abs(half) > max(_QUADRATIC * sqrt(abs(cubic)), abs(half - whole) / UNSETTLED)
 

@@ -35,7 +35,7 @@ from .variations import Place, Variations
 FloatArray = NDArray[np.float64]
 #: Newton steps to a special point at most, relative size of the last step, and greatest relative distance to the point.
 _STEPS, _LAST, _FAR = 12, 1e-7, 0.25
-#: Distance of a multiplier from +1 below which a motion counts as that at a fold.
+#: Distance of a multiplier from +1 below which a motion counts as the motion at a fold.
 _AT_FOLD = 1e-3
 #: Product of unit left and right eigenvectors below which a multiplier is double and has no derivative.
 _DOUBLE = 1e-6

@@ -32,18 +32,19 @@ from ..motion.orbit import PeriodicOrbit
 FloatArray = NDArray[np.float64]
 #: Gauss points of a panel; panels of a turn at first; halvings of a panel at most.
 _POINTS, _PANELS, _HALVINGS = 8, 32, 40
-#: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
-#: and of the effect of a parameter, relative to its greatest.
+#: Size of the last Legendre coefficients over a panel above which the panel is halved: for the rates and their derivatives, in
+#: the scale of y; for the effect of a parameter on the rates, relative to its greatest value.
 _RESOLVED, _EFFECT = 1e-10, 1e-8
-#: Jump of the same quantities between two panels above which both are halved.
+#: Jump of these quantities between two neighbouring panels, in units as above, above which both panels are halved.
 _CONTINUOUS = 1e-8
-#: A kink is in a panel shorter than ``_KINK`` (rad), over which the derivatives of the rates change by more than ``_STEEP``
-#: times their greatest value times the square root of its length: more than a root does, the derivative of a power 1.5.
+#: A panel has a kink if it is shorter than ``_KINK`` (rad) and if the derivatives of the rates change over it by more than
+#: ``_STEEP`` times their greatest value times the square root of its length. The square root is allowed because rates may have
+#: powers of 1.5.
 _KINK, _STEEP = 1e-6, 30.0
 #: Imaginary part below which a root counts as real.
 _REAL = 1e-9
 #: Effect of a parameter on the rates, relative to the effect of the motion, below which it counts as a rounding error; both are
-#: for changes as large as the quantities themselves.
+#: effects of changes as large as the quantities themselves.
 _NO_EFFECT = 1e-10
 #: Difference of the monodromy matrix from the orbit's, relative to its greatest entry, above which an error is raised.
 _AGREES = 1e-6
@@ -334,8 +335,8 @@ class Variations:
     def monodromy_derivatives(self, ways: FloatArray, constants: FloatArray) -> FloatArray:
         """Return the derivatives of the monodromy matrix with respect to m numbers, shape (n, n, m).
 
-        ``ways`` are the derivatives of y at the nodes with respect to these numbers, shape (k, s, n, m); ``constants`` are
-        those of the drive vector and, below them, of the constants, shape (c, m).
+        ``ways`` are the derivatives of y at the nodes with respect to these numbers, shape (k, s, n, m); ``constants`` are the
+        derivatives of the drive vector and, below them, of the constants, shape (c, m).
         """
         second = (self.second_derivatives(column) for column in np.moveaxis(self.fundamental, -1, 0))
         return np.stack([self.final_deviation(by_y @ ways + by_k @ constants) for by_y, by_k in second], axis=1)
