@@ -371,7 +371,9 @@ class Package:
         # the joint forces that are outputs are known only after motion.forces()
         self.outputs = Outputs(motion)
         inputs = [
-            f"{d.table}.{own}" for d in self.interface.drives if d.table for own in (d.load, "speed", "acceleration")
+            f"{d.table or d.name}.{own}"
+            for d in self.interface.drives
+            for own in (d.load, *(("speed", "acceleration") if d.table else ()))
         ]
         names = [*inputs, *(p.name for p in self.interface.parameters), *self.outputs.names()]
         for name in names:

@@ -464,6 +464,15 @@ def test_what_a_file_has_twice_is_named(tmp_path, text, place):
         load_linkage(tmp_path / "twice.toml")
 
 
+def test_an_undriven_freedom_with_the_name_of_its_slide_is_named():
+    """Both would have a force of this name."""
+    built = linkage("twice", ground={"O": (0, 0)}).body("block", points={"P": (0, 0)}, mass=1.0)
+    built.slide("rail", body="block", through="O").body("rotor", bar=("P", "E"), length=0.1, mass=1.0)
+    built.freedom("rotor", "P", speed=20.0).freedom("rail", "rail")
+    with pytest.raises(LinkworkError, match=r"would be called rail\.force: rail of linkage\.freedoms"):
+        built.mechanism()
+
+
 def test_a_free_body_without_mass_is_named(tmp_path):
     """Its acceleration is no number, and no run may begin."""
     data = changed("bodies/x", {"bar": ["C", "Q"], "length": 0.1})
