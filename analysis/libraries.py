@@ -32,7 +32,7 @@ class MissingLibraryError(LinkworkError, ImportError):
 
 
 def require(*libraries: str) -> None:
-    """Check that libraries, or those of modules such as ``lxml.etree``, are installed, without importing them.
+    """Check that libraries are installed, without importing them; a module such as ``lxml.etree`` stands for its library.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def require(*libraries: str) -> None:
 
 
 def lazy(library: str) -> Any:
-    """Return an object that imports a library when it is first used, and raises `MissingLibraryError` then if it is missing."""
+    """Return an object that imports a library at its first use, and raises `MissingLibraryError` there if it is missing."""
     return _LazyLibrary(library)
 
 

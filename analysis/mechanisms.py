@@ -213,8 +213,8 @@ InitialState = Any
 def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
     """Return the name of a channel in case files.
 
-    The name is the FMI name of the input, such as ``slider.force``. The name of the table (``slider``) is left out if the
-    table also has parameters and no other input in such tables has the same last part (``force``).
+    The name is the FMI name of the input, such as ``slider.force``. It is the last part alone (``force``) if the table
+    (``slider``) also has parameters, and no input of another table with parameters has the same last part.
     """
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
     bare = [c.name.rpartition(".")[2] for c in mechanism.channels if c.name.rpartition(".")[0] in tables]
@@ -261,7 +261,7 @@ def residual_outputs() -> frozenset[str]:
 
 @lru_cache(maxsize=64)
 def input_units(mechanism: Mechanism) -> Mapping[str, str]:
-    """Return the units of a mechanism's inputs, except rates, by the names of the arguments of `Inputs`."""
+    """Return the units of a mechanism's inputs, by their names in `Inputs`; rates of commanded speeds are left out."""
     units = {v.name: v.unit for v in mechanism.variables}
     return MappingProxyType({c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"})
 

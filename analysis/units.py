@@ -24,7 +24,7 @@ Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
 
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
-#: Results below this magnitude in the units of tables and pictures (mm, deg, N) are rounding, and shown as zero.
+#: Results below this magnitude in the units of tables and pictures (mm, deg, N) are rounding errors, and are shown as zero.
 ROUNDING = 1e-9
 
 #: Units of length (m).
@@ -246,7 +246,7 @@ def _pint_spelling(text: str, unit: str) -> str:
 def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
     """Convert a text with a unit to a number in the SI unit ``unit``, with pint.
 
-    ``spelled`` is ``unit`` in pint's spelling; ``wanted`` ends the error "it must ...".
+    ``spelled`` is ``unit`` in pint's spelling; ``wanted`` is the end of the error message "it must ...".
     """
     match = _GRAMMAR.fullmatch(_pint_spelling(text, unit)) if len(text) <= _LONGEST else None
     if match is None:

@@ -127,7 +127,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
     }
 
 
-#: Seconds by the clock after which a trial run counts as hung. It takes two, but many times as long on a busy machine.
+#: Seconds by the clock after which a trial run counts as hung. A run takes two, but many times as long on a busy machine.
 _PATIENCE = 600
 _TRIAL = """
 import sys

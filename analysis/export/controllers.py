@@ -143,7 +143,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return super().get_real(vrs)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set all values, or none if one is refused: after the first sample, an invalid parameter or any sample time."""
+        """Set all values, or none if one is refused; after the first sample, bad parameters and sample times are refused."""
         self._expect("fmi2SetReal", INSTANTIATED, INITIALISING, RUNNING)
         for reference, value in zip(vrs, values):
             if reference not in self.vars:
@@ -338,7 +338,7 @@ def _series(name: str, unit: str, text: str) -> tuple[Row, ...]:
 class MotionReference(Controller):
     """A motion as a function of the crank angle, and the force that belongs to it: Fourier series of six harmonics.
 
-    A controller uses the outputs at its next sample: with ``lead`` they are those of the angle that the crank has then.
+    The outputs are those at the angle that the crank will have after the time ``lead``, when a controller uses them.
     """
 
     rows = (

@@ -54,7 +54,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
 
     A mechanism that is not registered or has no cases has only its default experiment. The duration of this experiment is
     halved until the motion does not reach the limit of assembly, the solver takes at most `LONGEST` steps, and a run at the
-    tolerance of the experiment differs from the reference by a quarter of what is allowed at most.
+    tolerance of the experiment differs from the reference by at most a quarter of the allowed difference.
 
     The files of Linkwork's own mechanisms, whose references take many seconds in plain Python, are kept in the cache under a
     hash of all sources of Linkwork.
@@ -168,7 +168,7 @@ def _result_indices(mechanism: Mechanism) -> list[int]:
 
 
 class _TooLongError(Exception):
-    """At a ``time`` (s) the solver of the plant has taken too many steps, or the result depends too much on its tolerance."""
+    """At a ``time`` (s) the plant's solver has taken too many steps, or the result depends too much on its tolerance."""
 
     def __init__(self, time: float) -> None:
         self.time = time

@@ -45,8 +45,8 @@ class Platform(NamedTuple):
 
 
 #: Platforms by their names in FMI 3.0. glibc 2.17 is that of RHEL 7, and all later versions are compatible. macOS 11 was the
-#: first for ARM; without a version Zig requires the one that was new when Zig was made. On Windows Zig adds 65 kB of its own;
-#: code optimised for size is not slower there by more than the spread of measurements, some 5 %.
+#: first for ARM; if no version is named, Zig requires the one that was new when Zig was made. On Windows Zig adds 65 kB of its
+#: own; code optimised for size is not slower there by more than the spread of measurements, some 5 %.
 PLATFORMS = {
     "x86_64-linux": Platform("x86_64-linux-gnu.2.17", "so", "linux64", "x86_64-linux"),
     "aarch64-linux": Platform("aarch64-linux-gnu.2.17", "so", "aarch64-linux", "aarch64-linux"),
@@ -158,7 +158,7 @@ def build_native(
 def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict[str, str]:
     """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files.
 
-    With ``web`` there is also the file for a WebAssembly component.
+    If ``web`` is true, there is also the file for a WebAssembly component.
 
     Only all.c (`COMPILED`) is compiled; it includes all other C files. The functions of the standard have the prefix
     FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX if this macro is defined; no other symbols are exported.
@@ -191,8 +191,8 @@ def compile_binaries(
 ) -> dict[str, bytes]:
     """Compile the library for each platform; return the libraries by path in the archive.
 
-    The libraries for two architectures of macOS are in one file. With ``kept`` a library that was compiled before is not
-    compiled again; see `compile_library`.
+    The libraries for two architectures of macOS are in one file. If ``kept`` is true, a library that was compiled before
+    is not compiled again; see `compile_library`.
     """
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:

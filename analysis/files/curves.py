@@ -36,7 +36,7 @@ _TRANSFORMS = {
     "matrix", "translate", "translateX", "translateY", "scale", "scaleX", "scaleY", "rotate", "skew", "skewX", "skewY",
     "px", "pt", "pc", "mm", "cm", "in", "deg", "rad", "grad", "turn", "e", "E",
 }  # fmt: skip
-#: Elements whose content is drawn by a reference only: svgelements draws it in place.
+#: Elements whose content is drawn only where another element refers to it; svgelements draws the content itself, too.
 _REFERENCED = ("symbol", "mask", "marker")
 #: A centre of a transform that is not the origin, in a style or an attribute.
 _CENTRE = re.compile(

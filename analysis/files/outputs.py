@@ -34,7 +34,7 @@ class Writing:
     paths : dict of Path to Path
         Where each file was written: at its path, or beside a file that had to be kept.
     assumed : dict of Path to str
-        What was assumed of each file that was read, for lack of a statement in it.
+        Sentences on the units assumed for files that were read and do not state them.
     """
 
     command: str

@@ -161,7 +161,7 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z_0-9]*(\.[A-Za-z_][A-Za-z_0-9]*)*")
 
 
 def find_problems(fmu: str | Path) -> list[str]:
-    """Return the faults that FMPy finds in an FMU; its grammar, which takes seconds, parses no plain names of variables."""
+    """Return the faults that FMPy finds in an FMU; plain names of variables are not parsed, which would take seconds."""
     from fmpy import read_model_description
     from fmpy.validation import validate_fmu
 

@@ -283,7 +283,7 @@ class Many:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Reader of a range [least, greatest], or of one value for both; with ``ordered`` least must not exceed greatest."""
+    """Reader of a range [least, greatest], or of one value for both; if ``ordered``, least must not exceed greatest."""
 
     item: Reader
     ordered: bool = True

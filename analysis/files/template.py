@@ -89,7 +89,7 @@ def example(read: Reader) -> Any:
 def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
     """Return the explanations of a table's entries by name, from the docstring of the class or function ``kind``.
 
-    With ``follow`` the docstrings of all names in backticks in the docstring's first line are used as well.
+    If ``follow`` is true, the docstrings of all names in backticks in the docstring's first line are used as well.
     """
     doc = inspect.getdoc(kind) or ""
     found: dict[str, str] = {}

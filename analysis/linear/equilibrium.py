@@ -141,7 +141,7 @@ class Equilibrium:
         """Whether no small deviation of the free coordinates grows, dry friction left out; a neutral equilibrium is not stable.
 
         The stiffness must be positive, as at a minimum of the potential energy. A load in the axes of a body or a force law
-        that drives may let a vibration grow nevertheless: no pole may have a positive real part.
+        that drives may still let a vibration grow; therefore no pole may have a positive real part either.
         """
         balance = _Balance.build(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
@@ -287,7 +287,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return starting points for Newton's method: local minima of the imbalance on a grid, least ones at some angles."""
+        """Return starts of Newton's method: local minima of the imbalance on a grid, and its least values at some angles."""
         from scipy.ndimage import minimum_filter  # takes a quarter of a second
 
         units = {variable.name: variable.unit for variable in self.mechanism.variables}
@@ -396,9 +396,10 @@ def find_equilibrium(
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) to start from; the values for held degrees of freedom are ignored. Without a guess the stable
-        equilibrium of least `Equilibrium.potential` is returned or, if none is stable, the equilibrium of least potential. The
-        potential leaves out some forces, such as the laws of springs: then choose one of several stable equilibria by a guess.
+        All coordinates (rad, m) to start from; the values for held degrees of freedom are ignored. If no guess is given,
+        the stable equilibrium of least `Equilibrium.potential` is returned or, if none is stable, the equilibrium of least
+        potential. The potential leaves out some forces, such as the laws of springs: if these act, choose one of several stable
+        equilibria by a guess.
 
     Raises
     ------

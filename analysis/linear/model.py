@@ -364,7 +364,7 @@ def vibration_grows(poles: NDArray[np.complex128]) -> Any:
 
 
 def without_dry_friction(parameters: Parameters) -> Parameters:
-    """Return the parameters of a mechanism with all its dry friction set to zero: at rest it would hold everything."""
+    """Return the parameters of a mechanism with zero dry friction, which would hold all bodies at rest."""
     names = find_mechanism(parameters).names("friction")
     return replace(parameters, **{field_name(name): 0.0 for name in names})
 
@@ -460,13 +460,13 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
         Parameters of the mechanism, or a published set or its name.
     state : array_like
         All coordinates, then all rates, such as `Equilibrium.state`: for a five-bar (th2, u, th2', u'). The state need not be
-        an equilibrium. Otherwise the deviations are measured from the motion through this state, and the model holds at this
-        instant.
+        an equilibrium. If it is none, the deviations are measured from the motion through this state, and the model holds at
+        this instant.
     inputs : Inputs, optional
         Inputs at time 0, such as `Equilibrium.inputs`; they decide which degrees of freedom are free. By default no input acts.
         If a torque or force is a law of the state, such as a motor's or a torsion bar's, only its value is used: the poles are
-        those under a constant torque. With the law's derivative s with respect to a state, B s is added to this state's column
-        of A.
+        those under a constant torque. To include the law, add b s to the column of A that belongs to a state: s is the law's
+        derivative with respect to this state, b the column of B that belongs to the torque or force.
 
     Raises
     ------

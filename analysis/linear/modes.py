@@ -43,7 +43,7 @@ from .model import (
 )
 from .periodic import common_period
 
-#: Likeness (from 0 to 1) below which a shape is that of a new mode, because it is not like any known mode.
+#: Likeness (from 0 to 1) of a mode shape to the known modes below which it is that of a new mode.
 _NEW = 0.5
 
 
@@ -56,12 +56,12 @@ class NaturalModes:
     equilibria : tuple of Equilibrium
         The equilibrium at each position, dry friction left out.
     matrices : Matrices
-        The linear models about them, stacked.
+        The linear models about these equilibria, stacked.
     poles : ndarray, shape (s, 2 n)
         Eigenvalues (1/s) of the n free coordinates, by magnitude.
     frequencies : ndarray, shape (s, k)
         Natural frequencies (rad/s) of the k modes, in rising order of their means: magnitudes of the poles that oscillate. A
-        mode is followed from position to position by its shape, also where its frequency crosses that of another mode; nan
+        mode is followed from position to position by its mode shape, also where its frequency crosses that of another mode; nan
         at positions at which it does not oscillate.
     damping_ratios : ndarray, shape (s, k)
         Damping ratios: the negative real part of the pole over its magnitude.
@@ -124,11 +124,12 @@ def natural_modes(
     Parameters
     ----------
     parameters
-        Parameters of a mechanism, or a published set or its name. Dry friction is left out: at rest it would hold everything.
+        Parameters of a mechanism, or a published set or its name. Dry friction is left out: it would hold all
+        bodies at rest.
     inputs : Inputs, optional
         Constant inputs of the motion. Degrees of freedom with a commanded rate are held; cranks among them pass through the
-        positions of their common period. If no crank is commanded, the first one is held, and its torque left out; so is
-        every crank under a motor, which turns with it in the ratio of the speeds in ``initial``.
+        positions of their common period. If no crank is commanded, the first one is held, and its torque is left out. Every
+        crank under a motor is held too, and turns with the other cranks in the ratio of the speeds in ``initial``.
     initial : initial state, optional
         Position of the held degrees of freedom at the beginning, and guess of the equilibrium there.
     samples : int

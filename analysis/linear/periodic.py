@@ -33,8 +33,8 @@ from .model import (
 
 #: Least number of samples of a period.
 LEAST_SAMPLES = 16
-#: Samples for each of a model with dry friction, and at least in all, with which its mean decay rate is compared; largest
-#: difference of the two, relative to the fastest pole of the mean model.
+#: Check of a model with dry friction by closer samples: how many for each sample of the model, and how many at least in all;
+#: largest difference of the two mean decay rates, relative to the fastest pole of the mean model.
 BETWEEN, IN_ALL, RESOLVED = 2, 2048, 1e-2
 #: Newton steps at most to find the crank angle at a given time.
 MOST_ITERATIONS = 60
@@ -195,8 +195,8 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion: the model has no
-        derivative of its torque, `PeriodicOrbit.multipliers` do.
+        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the
+        model has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it.
 
         Raises
         ------
@@ -242,7 +242,7 @@ def linearise_orbit(
     inputs : Inputs, optional
         Inputs along a motion given as an array, whose first state is at time 0; none by default. If a torque or force is a law
         of the state, such as a motor's or a controller's, only its value is used: the model does not include the law's
-        derivative, also along an orbit under a motor.
+        derivative, not even along an orbit under a motor.
     period : float, optional
         Period (s); by default the period of the orbit, or, for an array at a constant prescribed speed, the time of one turn.
     samples : int

@@ -141,7 +141,7 @@ def load_package(path: str | Path) -> Package:
 
 #: A number in SI, or a text with a unit such as "50 mm".
 Amount = float | str
-#: Coordinates x, y; 0 means that a coordinate is always zero.
+#: Coordinates x, y; the whole number 0 means that a coordinate is always zero and is no parameter.
 Place = Sequence[Amount] | NDArray[np.float64]
 
 
@@ -261,7 +261,7 @@ class Builder:
     def slot(self, name: str, *, pin: str, on: str, through: str, direction: Amount | None = None) -> Builder:
         """Add a straight slot in the body ``on``, in which the ``pin`` of another body slides.
 
-        The centre line of the slot passes through the point ``through`` of ``on``, in a ``direction`` (rad) given in ``on``.
+        The centre line of the slot passes through the point ``through`` of ``on``, in a ``direction`` (rad) relative to ``on``.
         """
         return self._add("slots", name, pin=pin, on=on, through=through, direction=direction)
 
@@ -355,7 +355,8 @@ class Builder:
         speed : optional
             Commanded rate (rad/s, m/s); for a freedom that is not driven, its initial rate.
         driven : bool, optional
-            Whether its rate can be commanded; by default only the first freedom with a speed can be, or else the first.
+            Whether its rate can be commanded. By default this is true only of the first freedom that has a speed; if none
+            has one, of the first freedom.
         """
         return self._add("freedoms", name, joint=joint, start=start, speed=speed, driven=driven)
 
@@ -377,7 +378,7 @@ class Builder:
         name : str
             Name of the freedom, or of the cylinder.
         joint : str, optional
-            A pin or a slide: its ``speed`` is commanded (rad/s, m/s), or without a speed its torque or force is an input.
+            A pin or a slide: its ``speed`` is commanded (rad/s, m/s); if no speed is given, its torque or force is an input.
         between : (str, str), optional
             Two points; the force between them is an input.
         speed, start : optional

@@ -265,7 +265,8 @@ class FreedomTable:
         Commanded rate, at the start and as long as no input changes it (rad/s, m/s). The whole number 0 means that no rate is
         commanded; "0 rpm" commands rest. For a freedom that is not driven: its initial rate.
     driven : bool
-        Whether its rate can be commanded; by default only the first freedom with a speed can be, or else the first.
+        Whether its rate can be commanded. By default this is true only of the first freedom that has a speed; if none has
+        one, of the first freedom.
     """
 
     joint: str = entry(_name)

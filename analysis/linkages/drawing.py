@@ -101,7 +101,7 @@ class Picture:
         return function(signature, "Compute the places of the points of the picture.", rows)
 
     def drag_argument(self, point: PicturePoint) -> str:
-        """Return the source of the argument `Joint.moves` of a point: the first parameters that change when it is dragged.
+        """Return the source of the argument `Joint.moves` of a point: up to two parameters that dragging it changes.
 
         A point that only places parts cannot be dragged, and has the argument `Joint.aid` instead.
         """

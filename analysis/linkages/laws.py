@@ -40,7 +40,7 @@ def law(value: Any, name: str) -> Law:
     Raises
     ------
     ParameterError
-        If a formula has anything but names, arithmetic and the known functions, or a table has fewer than two pairs.
+        If a formula has anything but names, arithmetic and the known functions, or a table has fewer than two rows.
     """
     if isinstance(value, list):
         return _ROWS(value, name)

@@ -145,7 +145,7 @@ class Interface:
         ]
 
     def travel(self, slide: Slider) -> str:
-        """Return the source text for position and velocity of a block along its line; in it the variable of poses is b."""
+        """Return the source text for position and velocity of a block along its line; ``b`` is the variable of poses in it."""
         (holder, block), (x, y) = slide.bodies, self.coordinates(slide.bodies[0], slide.through)
         return f"block_position({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 
@@ -199,7 +199,7 @@ def _returning_turns(description: Description, structure: Structure, freedom: in
 
 
 def rotations(description: Description, structure: Structure, freedom: int) -> dict[str, float]:
-    """Return the rotations of bodies and gears by that of a freedom; infinite for a rack that is displaced.
+    """Return the rotation of each body per rotation of a freedom, by name; infinite for a rack that is displaced.
 
     Bodies of dyads, whose rotations are not proportional to that of a freedom, are left out.
     """
@@ -469,7 +469,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
 
 
 def length_and_mass(found: Interface) -> tuple[float, float]:
-    """Return the greatest length or coordinate (m), and the total mass of the bodies (kg); 1 instead of zero."""
+    """Return the greatest length or coordinate (m), and the total mass of the bodies (kg); each 1 if it is zero."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

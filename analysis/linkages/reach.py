@@ -17,7 +17,7 @@ from .description import GROUND
 from .package import Package
 from .structure import Pin, Slider
 
-#: Number of positions tried on each side of the start: per half turn of an angle, in total of a displacement.
+#: Number of positions tried on each side of the start: for an angle per half turn, for a displacement in all.
 _POSITIONS = 360
 
 
@@ -58,9 +58,9 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None) 
     freedom : int
         Index of the degree of freedom.
     most : float, optional
-        Greatest distance from the start that is searched, for an angle that has a limit on one side alone twice as far on the
-        other: by default half the period of the coordinate. If the coordinate is not periodic, the default is four turns for an
-        angle, and five times the length of the linkage for a displacement.
+        Greatest distance from the start that is searched, in both directions. If an angle has a limit in one direction only,
+        the other is searched twice as far. By default half the period of the coordinate; if it is not periodic, four turns
+        for an angle, and five times the length of the linkage for a displacement.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = variable_unit(mechanism, coordinate)
@@ -93,7 +93,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None) 
 
 
 class _End(NamedTuple):
-    """One end of a range: coordinate, whether the linkage can move on, least margin on the way."""
+    """One end of a range: coordinate, whether the linkage can move on, least clearance on the way."""
 
     at: float
     open: bool

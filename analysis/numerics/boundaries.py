@@ -41,7 +41,7 @@ class Line:
     roots : ndarray, shape (n,)
         Zeros of the test function, increasing.
     gaps : tuple of (float, str)
-        Places at which the test function has no value, each with the reason.
+        Arguments at which the test function has no value, each with the reason.
     """
 
     roots: NDArray[np.float64]
@@ -121,9 +121,9 @@ def _sample_function(
 def find_minimum(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
 ) -> tuple[float, float]:
-    """Find the minimum of a smooth function on an interval; return its place and its value.
+    """Find the minimum of a smooth function on an interval; return its argument and its value.
 
-    The error of the place is ``tolerance`` times the length of the interval; the error of the value is of second order.
+    The error of the argument is ``tolerance`` times the length of the interval; the error of the value is of second order.
 
     Raises
     ------

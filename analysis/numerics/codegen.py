@@ -219,7 +219,7 @@ class Writer:
         build.ret_void()
 
     def _place(self, which: int, place: int) -> Any:
-        """Return a pointer to the entry ``place`` of the argument ``which``, or to the vector of its values in all lanes."""
+        """Return a pointer to entry ``place`` of argument ``which`` (indices), or to the vector of its values in all lanes."""
         pointer = self.build.gep(self.arguments[which], [_index(place * self.lanes)])
         return self.build.bitcast(pointer, self.kind.as_pointer())
 
@@ -233,7 +233,7 @@ class Writer:
             self.build.store(self.build.extract_element(value, _index(lane)), target)
 
     def _input(self, which: int, place: int) -> Any:
-        """Return the entry ``place`` of the argument ``which`` in each lane."""
+        """Return entry ``place`` of argument ``which`` (indices) in each lane."""
         if which == 0:
             return self._repeat(self.arguments[0])
         return self.build.load(self._place(which, place), align=8)
@@ -456,10 +456,10 @@ class Kernel:
 
     @cached_property
     def unchecked(self) -> Callable[..., Any]:
-        """Return the machine code without the check of argument types: it misreads arguments of other types.
+        """Return the machine code, which does not check the types of its arguments and misreads arguments of other types.
 
-        Numba's comparison of the arguments with the signature takes 7 us; the tests make it here, too. Finding the machine code
-        takes 26 us, and is therefore done once.
+        Numba's check of the types takes 7 us; in the tests it is made here, too. Finding the machine code takes 26 us, and is
+        therefore done once.
         """
         (made,) = self.compiled.overloads.values()
         return made.entry_point  # type: ignore[no-any-return]

@@ -21,8 +21,8 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Correction, relative to the scales, at which a point counts as on the curve.
 TOLERANCE = 1e-10
-#: Correction, relative to the scales, below which Newton's method converges at once: corrections that small that do not fall to
-#: a half are errors of the values of G, and the point counts as on the curve.
+#: Correction, relative to the scales, below which a point counts as on the curve if the correction is more than half the one
+#: before. Newton's method converges much faster than that: such a correction is due to errors of the values of G.
 NOISE = 1e-7
 #: Largest number of corrections in a step; smallest number that makes a step hard: the next step is then not longer.
 MOST_CORRECTIONS, HARD = 10, 5
@@ -30,7 +30,8 @@ MOST_CORRECTIONS, HARD = 10, 5
 REACH = 0.5
 #: 1 / cos of the angle between old and new tangent above which the new tangent is computed without the old tangent.
 _OBLIQUE = 1e3
-#: Distance from the crossing of two curves of the points between which the crossing is interpolated, relative to the step.
+#: Where two curves cross, the point is interpolated between two points before and after it: their distance from it, relative
+#: to the step.
 _ASIDE = 1e-3
 #: Factors by which a step grows and shrinks.
 GROWTH, SHRINKAGE = 1.4, 0.5
@@ -264,7 +265,7 @@ class Follower:
     def start(self, y: ArrayLike, parameter: float, direction: int, across: ArrayLike | None = None) -> Point:
         """Find the point of the curve at a parameter, near ``y``, with the tangent to higher (+1) or lower (-1) parameters.
 
-        With ``across``, a vector in scaled unknowns and parameter of shape (n + 1,), the point is sought instead in the plane
+        If ``across`` is given, a vector in scaled unknowns and parameter of shape (n + 1,), the point is sought in the plane
         normal to ``across`` through the guess (``y``, ``parameter``). ``direction`` is then the sign of the tangent's component
         along ``across``.
 

@@ -315,7 +315,7 @@ class LoadedKernel:
             self._copies[id(array)].set(_as_bytes(array))
 
     def fetch(self, *arrays: NDArray[Any]) -> None:
-        """Copy arrays of the arguments from the device into themselves."""
+        """Copy arrays, which are arguments of the kernel, back from the device."""
         with _errors(self._cupy, _MEMORY):
             for array in arrays:
                 _as_bytes(array)[:] = self._copies[id(array)].get()

@@ -212,7 +212,7 @@ def _read_verified(path: Path) -> bytes:
 class _Cache(FunctionCache):
     """Cache of a dispatcher from which code is read without Numba's types and functions, which only compiling needs.
 
-    They take a third of a second, as Numba also imports the linear algebra of SciPy.
+    Loading them takes a third of a second, as Numba then also imports the linear algebra of SciPy.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

@@ -176,7 +176,7 @@ def symmetric_difference(curve, target, gradient):
 
 @kernel(void(MATRIX, MATRIX, boolean, VECTOR, int64[::1], VECTOR), purpose="the curves of linkages")
 def find_nearest(points, line, closed, distance, segment, share):
-    """Find the nearest place on a polyline to each point; write its distance, segment index and fraction of the segment.
+    """Find the nearest point of a polyline to each point; write its distance, segment index and fraction of the segment.
 
     ``points`` and ``line`` have the rows x, y, shape (2, k) and (2, m); a closed line goes on from its last point to its first.
     The results have shape (k,).

@@ -39,7 +39,8 @@ def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> Reboun
 def _power(base: Any, exponent: Any) -> Any:
     """Return the power of a symbol; at base zero all derivatives of a positive power are zero, where CasADi's own are NaN.
 
-    ``max(x, 0)**1.5`` then has its derivatives, which are zero, at every x below zero, too. Powers 1, 2 and 3 keep theirs.
+    ``max(x, 0)**1.5`` then has its derivatives, which are zero, at every x below zero, too. Powers 1, 2 and 3 keep
+    their true derivatives.
     """
     casadi = library()
     if isinstance(exponent, float | int) and float(exponent).is_integer():

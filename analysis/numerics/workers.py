@@ -58,7 +58,8 @@ class Interrupts(list[bool]):
 def record_interrupts() -> Iterator[Interrupts]:
     """Record each Ctrl-C in a list, which the caller checks between two steps.
 
-    An exception instead could be raised inside an FMU that runs in this interpreter, or inside Numba, which may drop it.
+    If Ctrl-C raised an exception instead, this could happen inside an FMU that runs in this interpreter, or inside Numba, which
+    may drop the exception.
     """
     interrupts = Interrupts()
     if threading.current_thread() is not threading.main_thread():
@@ -134,7 +135,7 @@ def run_in_parallel(
     Parameters
     ----------
     work : callable
-        Function of an item; its exceptions are raised here.
+        Function of an item; its exceptions are raised in this process.
     items : sequence
     interrupts : Interrupts, optional
         From `record_interrupts`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.

@@ -70,8 +70,8 @@ class WholeTurns:
     def _without_turns(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> Any:
         """Return the state x less multiples of ``way``; None if the mechanism does not behave the same there.
 
-        The same multiple is subtracted from all angles if a spring between turning bodies is twisted by the difference of their
-        turns.
+        ``way`` has the period of each angle, or a multiple of the period, and zeros elsewhere. The same multiple of ``way`` is
+        subtracted from all angles if a spring between turning bodies is twisted by the difference of their turns.
         """
         turning = way > 0.0
 

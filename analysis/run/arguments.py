@@ -91,7 +91,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
 
 
 def require_kind(value: Any, kind: type | tuple[type, ...], name: str, wanted: str) -> None:
-    """Raise InputError if an argument is not of the kind; ``wanted`` says in the message what to give instead."""
+    """Raise InputError if an argument is not an instance of ``kind``; ``wanted`` says in the message what to give instead."""
     if not isinstance(value, kind):
         shown = repr(value) if value is None or isinstance(value, (str, int, float)) else type(value).__name__
         raise InputError(f"{name} is {shown}: give {wanted}")
@@ -190,7 +190,7 @@ def usual_times(
     """Return the stop time and the sampling step of a run (s).
 
     The default stop time needs a crank that is driven at constant speed: it is the time of three revolutions of the slowest
-    such crank. The step is then by default the time of one degree of the fastest crank. With a given stop time the default
+    such crank. The step is then by default the time of one degree of the fastest crank. If a stop time is given, the default
     step is 1 ms.
 
     Raises

@@ -398,7 +398,7 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
     constant = -1
 
     def encode_kind(inputs: Inputs) -> tuple[int, list[float] | None]:
-        """Return the index in ``kinds``, one for all constant inputs, and the values of the inputs if they are constant."""
+        """Return the index of inputs in ``kinds``, the same for all constant inputs, and their values if they are constant."""
         nonlocal constant
         values = inputs.constants(signals)
         if values is None or constant < 0:

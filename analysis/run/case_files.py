@@ -121,7 +121,7 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 
 
 def case_mechanism(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism of a case: that of its published set, or without a set that of its parameters."""
+    """Return the mechanism of a case: that of its published set or, if it names no set, that of its parameters."""
     if "published" in data:
         return find_mechanism(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
     return _find_mechanism(data)
@@ -158,12 +158,12 @@ def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
 
 
 def _tolerance(value: Any, name: str) -> float:
-    """Return a tolerance of the solver.
+    """Check a tolerance of the solver and return it.
 
     Raises
     ------
     ParameterError
-        With the tolerance's name in the file, if it is outside of its range.
+        If the tolerance is outside its range; the message has its name in the file, ``name``.
     """
     number = quantity(value, "1", name)
     low, high = TOLERANCE_RANGE
@@ -179,11 +179,11 @@ class RunTable:
     Attributes
     ----------
     stop_time : float, optional
-        Duration of the run. By default three revolutions of the slowest crank.
+        Duration of the run. By default three revolutions of the slowest crank, if its speed is constant.
     revolutions : float, optional
         Duration in revolutions of the slowest crank, if its speed is constant. Not with stop_time.
     step : float, optional
-        Time between two samples. By default that of 1 deg of the fastest crank, or 1 ms.
+        Time between two samples. By default the time of 1 deg of the fastest crank; 1 ms if no crank has a constant speed.
     tolerance : float
         Tolerance of the solver, between 1e-13 and 0.01.
     """
@@ -503,8 +503,8 @@ class Case:
 def published_case(name: str) -> Case:
     """Return the case of a published set, with its published drive and initial state.
 
-    The run lasts three revolutions of the slowest crank, in steps of one degree of the fastest crank. Without a commanded
-    speed, duration and step are those of the default experiment of the FMU.
+    The run lasts three revolutions of the slowest crank, in steps of one degree of the fastest crank. If no speed
+    is commanded, duration and step are those of the default experiment of the FMU.
 
     Raises
     ------

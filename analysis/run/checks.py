@@ -45,9 +45,10 @@ def check(
     """Run a case in process and through an FMU, with the same inputs, and compare every output.
 
     In co-simulation both runs hold the inputs, and the compiled solver takes the same steps as the FMU's solver: the results
-    may agree to the last bit, which tests packaging and interfaces. With a method of SciPy or Hamming's method the integrators
-    are independent too. In model exchange CVode integrates the FMU with a hundredth of the case's tolerance, and the run in
-    process has a ten-thousandth: where friction reverses, the error of a run may be thousands of times its tolerance.
+    may agree to the last bit, and a difference shows a fault of packaging or interfaces. With a method of SciPy or Hamming's
+    method the integrators are independent too. In model exchange CVode integrates the FMU with a hundredth of the case's
+    tolerance, and the run in process has a ten-thousandth of it: where friction reverses, the error of a run may be thousands
+    of times its tolerance.
 
     Returns
     -------

@@ -154,7 +154,7 @@ def next_size(carry, size):
 
 @inner
 def _bounded_size(motion):
-    """Return the proposed step size, or a shorter one with which the step passes over no force and no limit of assembly."""
+    """Return the proposed step size, or a shorter one so that the step skips no short force and no limit of assembly."""
     x, room = motion.x, motion.room
     h = bounded_step_size(motion.carry.step, room.k[0], motion.problem.reach, motion.scale, 0, 1)
     for i in range(x.shape[0]):

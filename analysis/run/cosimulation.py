@@ -71,7 +71,7 @@ def cosimulate(
     Returns
     -------
     Trajectory
-        If the FMU refuses a step, the run ends with the FMU's solver.status and solver.message and all data up to there.
+        If the FMU refuses a step, the run ends with the FMU's solver.status and solver.message and all data up to that time.
 
     Raises
     ------

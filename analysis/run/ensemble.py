@@ -38,7 +38,7 @@ from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
 _SAMPLES_OF_BATCH = 1 << 16
-#: The same for a graphics processor, which needs thousands of runs at once to be fast.
+#: Largest number of samples in a batch on a graphics processor, which needs thousands of runs at once to be fast.
 _SAMPLES_ON_DEVICE = 1 << 22
 
 
@@ -305,7 +305,7 @@ def simulate_many(
 def _solve_batches(
     tasks: Sequence[Task], gathered: _Gathering, folder: Path | None, n_jobs: int | None, progress: bool
 ) -> Ensemble:
-    """Solve the batches of an ensemble in parallel and return the ensemble; the error of a broken one has what is done."""
+    """Solve the batches of an ensemble in parallel and return it; if that fails, the error has the results so far."""
     m = len(gathered.messages)
     into = gathered.samples if folder is None and share_memory(n_jobs, threads=True) else None
     with record_interrupts() as interrupts, show_progress(progress, float(m)) as show:
@@ -325,14 +325,14 @@ def _solve_batches(
 class _Gathering:
     """An ensemble whose arrays are allocated once, and filled with the results of batches as these arrive.
 
-    With a folder the arrays are mapped to unnamed files there, so that they take little memory.
+    If a folder is given, the arrays are mapped to unnamed files there, so that they take little memory.
     """
 
     def __init__(self, folder: Path | None, mechanism: Mechanism, chosen: bool, empty: Ensemble) -> None:
         m, n = empty.status.size, len(empty.time)
         sizes = (len(empty.names),) if chosen else (mechanism.size, len(mechanism.channels))
         self.maps: list[mmap.mmap] = []
-        #: what batches fill: states and channels, or the chosen outputs
+        #: arrays that the batches fill: states and channels, or the chosen outputs
         self.samples = [self._allocate((m, n, size), folder) for size in sizes]
         self.messages = ["not run: interrupted"] * m
         arrays: dict[str, Any] = dict(zip(("values",) if chosen else ("states", "forces"), self.samples))
@@ -398,7 +398,7 @@ def _check_device(device: str | None, n_jobs: int | None, functions: bool) -> st
 def _check_runs(
     mechanism: Mechanism, inputs: Any, initial: Any, count: int
 ) -> tuple[Sequence[Inputs], list[InitialState]]:
-    """Check the inputs and initial states and return those of each run; see `simulate_many` for what inputs must share."""
+    """Check inputs and initial states, and return lists with those of each run; `simulate_many` says what inputs must share."""
     all_inputs, starts = _one_per_run(inputs, count, "inputs"), _one_per_run(initial, count, "initial states")
     nothing, rest = check_run(mechanism, None, None)
     if not isinstance(all_inputs, VariedSequence):

@@ -35,7 +35,8 @@ EXPERIMENTS = f"extra/{STANDARD}"
 MANIFEST = f"{EXPERIMENTS}/fmi-ls-manifest.xml"
 #: Type of Linkwork's annotation for the largest relative difference that an experiment allows.
 ALLOWED = "org.linkwork.allowed"
-#: Without that annotation: factor of the tolerance, and least value of their product; allowed difference without a tolerance.
+#: Difference that is allowed without this annotation: the first number times the experiment's tolerance, but at least the
+#: second number; the third number if the experiment has no tolerance.
 _FACTOR, _LEAST_ALLOWED, _DEFAULT_ALLOWED = 100.0, 1e-6, 1e-3
 #: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
 _LEAST_SCALE = 1e-3
@@ -348,9 +349,10 @@ def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
 
 
 def deviation_scales(columns: Iterable[NDArray[Any]], units: Sequence[str]) -> NDArray[np.float64]:
-    """Return the scale of each variable's differences from the columns of a reference.
+    """Return the scale of each variable's differences, computed from the columns of a reference.
 
-    It is the greatest magnitude, at least `_LEAST_SCALE` of the greatest one of all variables with the same unit; 1 for zeros.
+    The scale is the greatest magnitude in the column, but at least `_LEAST_SCALE` times that of all variables with the same
+    unit; 1 if all their values are zero.
     """
     sizes, kinds = np.array([float(np.abs(column).max()) for column in columns]), np.array(units)
     scales = np.maximum(sizes, _LEAST_SCALE * np.array([sizes[kinds == unit].max() for unit in units]))

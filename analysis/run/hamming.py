@@ -50,8 +50,8 @@ class Point(NamedTuple):
 class Hamming(OdeSolver):  # type: ignore[misc]
     """Hamming's modified predictor-corrector as a method of `scipy.integrate.solve_ivp`.
 
-    A step takes two evaluations of the right-hand side. The step size is constant until the error requires half of it or
-    allows twice of it; ``first_step == max_step`` with a loose tolerance keeps it fixed.
+    A step takes two evaluations of the right-hand side. The step size is constant until the error requires half of this
+    size or allows its double; ``first_step == max_step`` with a loose tolerance keeps it fixed.
 
     Parameters
     ----------

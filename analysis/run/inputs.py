@@ -29,7 +29,7 @@ from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, Sta
 NUMBER = (int, float, np.floating, np.integer)
 #: Largest numerator and denominator of a ratio of crank speeds: beyond it the cranks count as without a common period.
 MOST_TURNS = 100
-#: Largest numerator and denominator of a ratio of speeds at the start that is taken as it is: see `start_ratio`.
+#: Largest numerator and denominator of a ratio of speeds at the start that is not rounded: see `start_ratio`.
 _MOST_AT_START = 6
 _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
@@ -288,7 +288,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
 
 
 def start_ratio(value: float, speed: float) -> Fraction:
-    """Return value / speed, of speeds at the start of a run, as a fraction of small whole numbers, or else rounded."""
+    """Return value / speed at the start of a run: a fraction of small whole numbers, or else the nearest whole number."""
     ratio = Fraction(value / speed).limit_denominator(_MOST_AT_START)
     exact = abs(ratio * speed - value) <= 1e-9 * abs(value) and abs(ratio.numerator) <= _MOST_AT_START
     return ratio if exact else Fraction(round(value / speed))

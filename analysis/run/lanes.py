@@ -51,8 +51,8 @@ class Lanes(NamedTuple):
     ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the index of its run or -1, ``phase`` and
     ``outcome`` are constants of this module, ``last`` is 1 if the step is the last of its interval. In lanes: state ``x``,
     state at the end of the step ``y`` and at a stage ``z``, modes, channels, constants, scales, step size, error, fraction of
-    the step, stages, interpolant, clearance at the end of the step and after `PROBE` of it. Row l of ``between`` is the state
-    of lane l at its fraction of the step.
+    the step, stages, interpolant, clearance at the end of the step and after its fraction `PROBE`. Row l of ``between`` is
+    the state of lane l at its fraction of the step.
     """
 
     code: NDArray[np.int64]

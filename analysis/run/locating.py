@@ -111,7 +111,7 @@ def _locate(e, low, high, h, motion):
 def _events_of_step(what, cut, h, motion):
     """Record the user's events inside a step; return the first event that ends the step, and its fraction of the step.
 
-    Without the user's events the step ends at the event ``what`` and the fraction ``cut`` of the step.
+    If no event of the user ends the step earlier, it ends with the event ``what`` at the fraction ``cut`` of the step.
     """
     watch, room = motion.watch, motion.room
     for e in range(watch.table.shape[0]):

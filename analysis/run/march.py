@@ -22,7 +22,8 @@ from .prepared import Run, verdict
 from .sampling import NotFiniteError, release, sample
 from .trajectory import Occurrence, Trajectory
 
-#: Evaluations without a value at almost the same time after which an implicit method is stopped: LSODA would never stop.
+#: Number of evaluations without a value, at almost the same time, after which an implicit method is stopped: LSODA itself would
+#: never stop.
 MOST_LOSSES = 300
 
 #: What can end an interval early: an event of the user, the number of a torsion bar that is released, or None for the limit
@@ -95,7 +96,7 @@ class March:
         #: evaluations without a value
         self._lost: int | None = None
         self.losses = 0
-        #: times in the present interval count as equal if their distance is smaller (s)
+        #: times in the present interval count as equal if they differ by less than this (s)
         self.same = 0.0
         #: replaces a derivative without a value: 1e200 makes the error large, NaN ends the iterations of Radau and BDF
         self.nothing = 1e200

@@ -43,7 +43,10 @@ class Mass(NamedTuple):
 def _values(
     link: Link, units: Mapping[str, str], made: LinkBody, length: float, mass: float | None
 ) -> dict[str, float]:
-    """Return mass, moment of inertia and centre of mass of a link (SI), by parameter names; ``mass`` is the weighed mass."""
+    """Return mass, moment of inertia and centre of mass of a link with the body ``made`` (SI), by parameter names.
+
+    ``mass`` is the weighed mass; None if the mass follows from the body.
+    """
     own, (x, y), inertia = made.properties(length)
     if mass is not None:  # weighed: the shape, and so the radius of gyration, is that of the section
         own, inertia = mass, inertia * mass / own

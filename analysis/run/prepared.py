@@ -29,7 +29,7 @@ from .trajectory import Occurrence, Trajectory
 
 #: Steps in one compiled call, about a tenth of a second; between calls progress is shown and Ctrl-C is checked.
 STEPS_PER_CALL = 50_000
-#: Room for events in one compiled call, for each event of the user; if the table is full the call returns.
+#: Number of times that each event of the user may happen in one compiled call, on average; if there are more, the call returns.
 EVENTS_PER_CALL = 1_000
 #: Energy (J) and magnitude of inputs above which energy and accelerations at the start are checked for overflow.
 _GREAT = 1e100
@@ -344,8 +344,8 @@ def verdict(
 ) -> tuple[int, str]:
     """Return the solver.status and solver.message for a status of the compiled code at the time t and the state x.
 
-    ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is zero, or the
-    number of steps that the run would have needed if it was given up as stiff.
+    ``limit`` returns the message for a limit of the motion; by default the message is that of the limit of assembly. ``needed``
+    is the number of steps that a run given up as stiff would have needed, else zero.
     """
     k = _records()
     if status not in (k.LIMIT, k.NO_STEP, k.RUNNING):

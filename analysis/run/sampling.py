@@ -90,7 +90,7 @@ def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64])
 
 
 def function_values(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what the user's functions add to the channels at time t and state x, shape (channels,)."""
+    """Return the values that the user's functions add to the channels at time t and state x, shape (channels,)."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
     for functions, places in zip(encoded.functions, encoded.source.places):

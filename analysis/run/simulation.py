@@ -164,7 +164,7 @@ def simulate(
     -------
     Trajectory
         A run that reaches the limit of assembly, or whose step size underflows, ends there with a status, a message and all
-        data up to there.
+        data up to that time.
 
     Raises
     ------

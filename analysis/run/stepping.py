@@ -75,7 +75,7 @@ def _local_error(x, y, k, h, scale):
 
 @inner
 def leading_error(n, x, y, k, h, scale, lane, lanes):
-    """Return the error estimate of `_local_error` for the first n components alone; ``lane`` is one of so many ``lanes``."""
+    """Return the error estimate of `_local_error` for the first n components alone, in lane number ``lane`` of ``lanes``."""
     sum3 = sum5 = 0.0
     for i in range(n):
         place, e3, e5 = i * lanes + lane, 0.0, 0.0

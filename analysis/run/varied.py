@@ -170,7 +170,7 @@ def check_sets(mechanism: Mechanism, sets: VariedSequence) -> None:
 def varied_constants(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[SimpleNamespace, Any]:
     """Return the parameters of all sets as one object with arrays, and the constants of the equations computed from it.
 
-    With `VariedSequence` sets, parameters that do not vary are numbers.
+    If ``sets`` are a `VariedSequence`, parameters that do not vary are numbers.
     """
     _, like = array_functions(mechanism)
     names = [field.name for field in fields(mechanism.parameters)]

@@ -114,7 +114,7 @@ def slider_motion(
 
 
 def greatest_derivative(linkage: Linkage, order: int) -> float:
-    """Return the greatest magnitude over a turn of the derivative of this order of the slider position (m/rad^order).
+    """Return the greatest magnitude, over a turn, of the slider position's derivative of the given ``order`` (m/rad^order).
 
     The derivative is with respect to the crank rotation; order 0 is the position itself. If no slider moves the pivot, the
     result is 0.

@@ -50,7 +50,7 @@ class Step:
     solution : Solution or None
         Best solution of the mechanism; None if there is none.
     value : float
-        Quality function or worst error, whichever is compared with the tolerance; infinite without a solution.
+        Quality function or worst error, whichever is compared with the tolerance; infinite if there is no solution.
     reason : str
         Reason why the mechanism was accepted or rejected.
     """

@@ -439,7 +439,7 @@ def settle(
     unit : float
         Unit of length (m) in which lengths are compared with angles; the thesis uses the inch.
     step_tolerance : float
-        A step counts as small if no angle (rad) and not the slider position (``unit``) changes by more than this.
+        A step counts as small if neither an angle (rad) nor the slider position (in ``unit``) changes by more than this.
     max_steps : int
         Largest number of steps.
 

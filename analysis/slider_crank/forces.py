@@ -91,11 +91,11 @@ def solve(
 ) -> Solution:
     """Solve one of the force problems at configurations that can be assembled, on arrays, dual numbers or symbols.
 
-    ``f`` are the equations for such values. The other arguments are constants, theta1 (rad), the shift's motion, theta1'
-    (rad/s) and theta1'' (rad/s2); ``given`` is the load (N) or, with ``torque``, the torque (N.m): the load is then sought,
-    which is not finite where the ratio is zero. ``groove`` says whether the parameters' groove makes the shift. The ratio is
-    minus the derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the shaft makes the
-    shift.
+    ``f`` are the plant's equations for arrays, dual numbers or symbols. The other arguments are constants, theta1 (rad), the
+    shift's motion, theta1' (rad/s) and theta1'' (rad/s2). ``given`` is the load (N) or, if ``torque`` is true, the torque
+    (N.m); in the second case the load is sought, which is not finite where the ratio is zero. ``groove`` says whether the
+    parameters' groove makes the shift. The ratio is minus the derivative of the torque with respect to the load (m): kth, or
+    dS4/dtheta1 if a groove in the shaft makes the shift.
     """
     q = f.position(angle, shift.shift, p)
     k = f.coefficients(q, p)
@@ -385,8 +385,8 @@ def force_turn(
         If the parameters are not those of a slider-crank, both ``load`` and ``torque`` are given, a value is not finite or has
         the wrong shape, or ``shift`` is not a `ShiftLaw`.
     AssemblyError
-        If the rod does not reach the guide at some angle; the message gives the ranges in which it does. With ``partial`` only
-        if it reaches the guide at no angle.
+        If the rod does not reach the guide at some angle; the message gives the ranges in which it does. If ``partial`` is
+        true, only if the rod reaches the guide at no angle.
 
     Examples
     --------

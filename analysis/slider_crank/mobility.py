@@ -36,7 +36,7 @@ FINEST = 1e-3
 #: Value relative to its scale below which a function counts as zero, so that rounding errors do not make a slider at rest turn
 #: back.
 _ROUNDING = 1e-13
-#: Relative difference up to which the rod and its distance to the guide count as equal: their rounding errors.
+#: Relative difference up to which the rod and its distance to the guide count as equal: the difference may be a rounding error.
 _EQUAL = 8.0 * float_info.epsilon
 #: Pieces into which the turn is divided first.
 _PIECES = 32
@@ -249,7 +249,7 @@ def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> 
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Find the place between ``low`` and ``high`` at which ``positive`` changes its value, by bisection to the last digit."""
+    """Find the angle between ``low`` and ``high`` at which ``positive`` changes its value, by bisection to the last digit."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)
@@ -383,7 +383,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
 
 
 def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
-    """Return the configuration at a crank angle; with ``limit`` the rod is exactly perpendicular to the guide."""
+    """Return the configuration at a crank angle; if ``limit``, with the rod exactly perpendicular to the guide."""
     shift = law.at(angle)[0]
     # at the limit h is set to zero: the square root would magnify the rounding error of the angle
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
@@ -475,7 +475,7 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
 
 @takes_published()
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """Find the configurations along the law in which crank torque and slider force do not balance: kth = 0.
+    """Find the configurations along the law in which the crank torque does not determine the slider force: kth = 0.
 
     kth is the derivative of the slider position with respect to the crank angle at constant shift. If the shift has a drive of
     its own, kth multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate

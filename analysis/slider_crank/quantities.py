@@ -75,7 +75,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return the units of a system for tables and figures: those of `unit_table`, but with "SI" lengths are in mm.
+    """Return the units of a system for tables and figures: those of `unit_table`, except that "SI" has lengths in mm.
 
     Raises
     ------

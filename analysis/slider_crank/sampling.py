@@ -212,7 +212,7 @@ class MonteCarlo:
     def place(self, quantity: str, angle: Amount) -> int:
         """Return the index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
 
-        For an angle outside of the sampled ones whole turns count as none, if the shift is known to repeat after them.
+        An angle outside the sampled range is reduced by whole turns, if the shift is known to repeat after them.
 
         Raises
         ------
@@ -346,7 +346,7 @@ def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
 
 
 class _Draws(NamedTuple):
-    """Statistics of the samples at one crank angle."""
+    """Statistics of the samples at one crank angle, and the numbers of samples that are left out."""
 
     statistics: Mapping[str, tuple[Any, ...]]  # fields of `Spread`, by quantity
     across: bool  # whether samples fall on both sides of a dead centre
@@ -416,7 +416,7 @@ def _compile_problem(
 
 
 def _statistics(name: str, values: FloatArray, here: str) -> tuple[Any, ...]:
-    """Return the fields of `Spread` for the samples of a quantity at the angle ``here``, NaN without samples.
+    """Return the fields of `Spread` for the samples of a quantity at the angle ``here``; NaN if there are none.
 
     Raises InputError if the variance is too large for a number.
     """
@@ -447,9 +447,10 @@ def _statistics(name: str, values: FloatArray, here: str) -> tuple[Any, ...]:
 
 
 def order_statistics(values: FloatArray, places: NDArray[np.int64]) -> FloatArray:
-    """Return the values that would be at ``places`` if all values were sorted; a partition would take four times as long.
+    """Return the values that would be at the indices ``places`` if all values were sorted.
 
-    The values are counted in equal bins. Only those in the bins of the places are sorted.
+    The values are counted in equal bins, and only those in the bins of the wanted indices are sorted. A partition would take
+    four times as long.
     """
     low = float(values.min())
     high = _upper_end(low, float(values.max()))
@@ -465,7 +466,7 @@ def order_statistics(values: FloatArray, places: NDArray[np.int64]) -> FloatArra
 
 
 def _upper_end(low: float, high: float) -> float:
-    """Return the end of the last bin from ``low`` to ``high``: further up if floats could not tell the bins apart."""
+    """Return the upper end of bins that begin at ``low``: ``high``, or more if floats could not tell the bins apart."""
     return max(high, low + max(1e-12 * max(abs(low), abs(high)), 1e-300))
 
 

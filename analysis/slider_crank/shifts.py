@@ -241,7 +241,10 @@ class Course:
         return tuple(sorted(end for end in moved if low <= end <= high))
 
     def zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
-        """Find the configurations from ``low`` to ``high`` (rad) in which the slider reverses (at a ``held`` shift)."""
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider reverses.
+
+        If ``held``, these are the configurations in which the slider would reverse if the shift stayed constant there.
+        """
         repeating = self.law.periodic_shift(self.parameters)
         if repeating is None:
             return self._sign_changes(low, high, 0.0 if held else 1.0)

@@ -165,8 +165,8 @@ class System:
     def _modes(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
         """Return the drive mode of each freedom.
 
-        It is the mode of the connected input; without one, that of the input with a start value; without either, that of the
-        case.
+        It is the mode of the connected input; if none is connected, that of the input with a start value; if none has one,
+        that of the case.
         """
         found = {mode: float(value) for mode, value in inputs.modes(mechanism).items()}
         for number, freedom in enumerate(mechanism.freedoms):

@@ -90,7 +90,7 @@ class Instance:
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
     ) -> None:
-        """Set inputs for a step to their values at its start, with their slopes over it; without slopes they are held.
+        """Set inputs for a step to their values at its start, with their slopes over it; if ``slopes`` is None they are held.
 
         A part that accepts no slopes holds the inputs at their values ``middle`` (s) after the start of the step. ``updated``
         says whether an FMI 3.0 part follows the slopes by intermediate updates.
@@ -159,7 +159,7 @@ class Instance3(Instance):
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
     ) -> None:
-        """Set inputs for a step as `Instance.set_inputs` does; without updates, hold their values at ``middle``."""
+        """Set inputs for a step as `Instance.set_inputs` does; if not ``updated``, hold their values at ``middle``."""
         references = [self.part.ports[name].reference for name in names]
         self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
         self._lines = bool(references) and slopes is not None and updated

@@ -182,7 +182,7 @@ class _Instances:
         self.last = 1.0
 
     def _settle(self) -> None:
-        """Exchange outputs until they no longer change: without algebraic loops in at most as many rounds as there are parts.
+        """Exchange outputs until they no longer change; if there is no algebraic loop, this takes at most one round per part.
 
         If an algebraic loop does not settle, its values of the last round are kept.
         """

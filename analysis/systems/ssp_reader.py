@@ -1,7 +1,7 @@
 """Read systems from SSP archives (System Structure and Parameterization), of this and of other tools.
 
-What the standard has and a `Wiring` has not is refused: systems in other files, signal dictionaries, and transformations of
-connections.
+Parts of the standard that a `Wiring` cannot represent are refused: systems in other files, signal dictionaries, and
+transformations of connections.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class _Source:
 
 
 def _map(values: Mapping[str, Given], mapping: Node) -> dict[str, Given]:
-    """Return start values under the names of a mapping; those that it does not name are not applied."""
+    """Return start values under the names that a mapping gives them; values that it does not name are left out."""
     found = {}
     for entry in _below(mapping, "MappingEntry"):
         if (name := entry.get("source", "")) in values:
@@ -132,7 +132,8 @@ def _map(values: Mapping[str, Given], mapping: Node) -> dict[str, Given]:
 def read_ssp(path: str | Path) -> Wiring:
     """Read a system from an ``.ssp``: FMUs, connections, start values from ``.ssv`` with names mapped by ``.ssm``.
 
-    The parts of a system inside the system are parts like the others; their names begin with its name, as in ``drive_motor``.
+    The parts of a system inside the system are parts like the others; their names begin with the name of the inner system, as
+    in ``drive_motor``.
     Start values that match no variable are named in the notes of the wiring.
 
     Raises

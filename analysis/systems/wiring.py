@@ -28,12 +28,12 @@ DIMENSIONLESS = tuple(float(k == "factor") for k in BASE)
 
 
 def exponents(unit: Any) -> tuple[float, ...]:
-    """Return the exponents of the base units, factor and offset of a definition, as FMPy reads it."""
+    """Return the exponents of the base units, the factor and the offset of a unit's definition, as FMPy reads it."""
     return tuple(1.0 if k == "factor" and getattr(unit, k) is None else getattr(unit, k) or 0 for k in BASE)
 
 
 def same_unit(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    """Return whether two definitions of units agree, whose factors tools round differently; see `Part.base_unit`."""
+    """Return whether two definitions of units agree up to the rounding of their factors; see `Part.base_unit`."""
     return one == other or (len(one) == len(other) > 1 and all(map(partial(isclose, rel_tol=1e-9), one, other)))
 
 
@@ -197,7 +197,7 @@ class Wiring:
     stop_time, step : float
         End of a run, and default communication step (s).
     remarks : tuple of str
-        What of the file from which the system was read has no effect.
+        Sentences on entries of the system's file that have no effect.
 
     Raises
     ------
@@ -244,7 +244,7 @@ class Wiring:
         return self.parts[end.part].ports[end.port]
 
     def unit(self, end: End) -> str:
-        """Return the unit of a port; if its FMU tells no units, the unit of what it is connected to."""
+        """Return the unit of a port; if its FMU states no units, the unit of the port to which it is connected."""
         others = [t for t, source in self.connections.items() if source == end]
         others += [self.connections[end]] if end in self.connections else []
         return next((self.port(one).unit for one in (end, *others) if self.port(one).unit), "")
@@ -262,8 +262,8 @@ class Wiring:
     def notes(self, step: float | None = None) -> list[str]:
         """Return the remarks and hints at possible mistakes.
 
-        These are unconnected inputs, controllers without gains, or sampled more often than there are communication steps of
-        ``step`` seconds (by default those of the system), and algebraic loops.
+        The hints are about unconnected inputs, ports without units, controllers without gains, controllers whose sample time is
+        shorter than the communication step ``step`` (s; by default that of the system), and algebraic loops.
         """
         step = self.step if step is None else step
         found = [*self.remarks]

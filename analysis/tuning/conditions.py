@@ -131,7 +131,7 @@ def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> Floa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossPlane:
-    """A plane across the branch, normal . (y, level) = offset; it fixes the level if the normal is 0 except at its end."""
+    """A plane across the branch, normal . (y, level) = offset; it fixes the level if only the normal's last entry is not 0."""
 
     normal: FloatArray
     offset: float

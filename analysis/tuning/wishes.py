@@ -117,7 +117,7 @@ class Wish:
     between : (float, float), optional
         Range of the quantity ``over``: numbers in SI, or texts with units.
     drive : Drive, optional
-        All that drives the mechanism; needed without a range of speeds.
+        All that drives the mechanism; needed if ``speeds`` are not given.
     start : array_like, optional
         Guess of the motion at the low end of the range, as for `find_orbit`: needed under a torque without a motor.
     turns : int
@@ -135,7 +135,7 @@ class Wish:
         The largest Floquet multiplier is at most 1 - ``least_margin``.
     limits : sequence of Limit
     least : str
-        Parameter to be minimised; without it the sum of the squares of the changes is minimised, each divided by its tolerance.
+        Parameter to be minimised; by default the sum of the squares of the changes, each divided by its tolerance.
 
     Raises
     ------
