@@ -1,4 +1,4 @@
-"""Cautions about a run: it is stiff, its energy residual exceeds the tolerance, or the twist of a spring slips a turn."""
+"""Cautions about a run: it is stiff, outputs are not finite, the energy residual is large, or a spring slips a turn."""
 
 from __future__ import annotations
 
@@ -87,6 +87,22 @@ def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.f
         if len(jumps):
             found.append(f"{name} at t = {time[jumps[0] + 1]:.4g} s")
     return f"the torque of {' and '.join(found)} {SLIPPED}" if found else ""
+
+
+def undefined_outputs(names: Sequence[str], time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
+    """Return a caution that names the outputs that are not finite at a sample; else an empty text.
+
+    ``values`` are the outputs ``names`` at the samples, shape (n, outputs), and ``time`` the times of the samples (s).
+    """
+    if np.isfinite(values.sum()):
+        return ""
+    samples, columns = np.nonzero(~np.isfinite(values))
+    found = [names[column] for column in dict.fromkeys(columns.tolist())]
+    if not found:
+        return ""
+    more = f" and {len(found) - 3} more outputs" if len(found) > 3 else ""
+    verb = "is not a finite number" if len(found) == 1 else "are not finite numbers"
+    return f"{', '.join(found[:3])}{more} {verb} at t = {time[samples[0]]:.4g} s: the equations do not determine them there"
 
 
 @lru_cache(maxsize=64)

@@ -15,7 +15,7 @@ from linkwork.integrate import UNDEFINED
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
-from .cautions import energy_balance, twists
+from .cautions import energy_balance, twists, undefined_outputs
 from .events import Event, RunInterrupted, show_progress
 from .locating import SAME
 from .prepared import Run, verdict
@@ -50,9 +50,9 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     if march.status == k.NO_STEP:
         message += f": {run.describe_failed_step(march.good[1])}"
     table = np.array(values).reshape(-1, len(names))
-    if not code:
-        message = energy_balance(names, table, run.settings.tolerance)
     time = np.array([t for t, _, _ in rows])
+    if not code:
+        message = undefined_outputs(names, time, table) or energy_balance(names, table, run.settings.tolerance)
     message = "; ".join(filter(None, (message, twists(run.mechanism, time, table))))
     trajectory = Trajectory(
         time=time,

@@ -20,7 +20,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import record_interrupts
 from .angles import WholeTurns
-from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness, twists
+from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness, twists, undefined_outputs
 from .equations import OUTPUTS, compile_outputs, machine
 from .events import Event, RunInterrupted, show_progress
 from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode_once
@@ -236,8 +236,10 @@ class Run:
         if status[0] == k.NO_STEP:
             message += f": {self.describe_failed_step(x)}"
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
-        balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
-        message = "; ".join(filter(None, (message, stiff, balance, twists(self.mechanism, times, values))))
+        names, doubt = self.mechanism.output_names, ""
+        if not code:
+            doubt = undefined_outputs(names, times, values) or energy_balance(names, values, self.settings.tolerance)
+        message = "; ".join(filter(None, (message, stiff, doubt, twists(self.mechanism, times, values))))
         trajectory = Trajectory(
             time=times,
             values=values,
@@ -249,7 +251,7 @@ class Run:
             ),
             source="compiled DOP853" + balanced * ", energy balanced",
             parameters=self.parameters,
-            names=self.mechanism.output_names,
+            names=names,
             statistics={
                 "steps": float(last["steps"] - last["rejected"]),
                 "rejected": float(last["rejected"]),

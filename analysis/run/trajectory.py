@@ -53,8 +53,8 @@ class Trajectory(NotebookResult):
     status : int
         0 if the run reached its end or a stopping event, else the solver.status of the FMI contract.
     message : str
-        Why the run ended early. For a complete run a caution if it is stiff, or if the residual of the energy balance is larger
-        than the tolerance promises; else empty.
+        Why the run ended early. For a complete run a caution if it is stiff, if outputs are not finite numbers, or if the
+        residual of the energy balance is larger than the tolerance promises; else empty.
     events : tuple of Occurrence
         Events in order of time.
     source : str

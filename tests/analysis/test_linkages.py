@@ -1435,3 +1435,17 @@ def test_no_step_passes_over_a_limit_after_a_rest(make: Callable[[], tuple[Any, 
             run = simulate(parameters, inputs, initial=initial, stop_time=6.0)
         assert "limit of assembly" in run.message
         assert limit - 1e-3 * speed - 1e-3 < run[name][-1] < limit + 1e-6
+
+
+@pytest.mark.parametrize("method", ["compiled", "RK45"])
+def test_a_run_says_which_outputs_the_equations_do_not_determine(method: str) -> None:
+    built = linkage("gear-pair", ground={"A": (0, 0), "E": (0.06, 0.0)})
+    built.body("crank", points={"A": (0, 0)}, mass=1.0, inertia=1e-3).body(
+        "wheel", points={"E": (0, 0)}, mass=1.0, inertia=1e-3
+    )
+    built.gear("Z", bodies=("crank", "wheel"), ratio=-0.5).freedom("crank", "A", speed=30.0)
+    known = built.mechanism().first_set
+    assert simulate(known.parameters, method=method, stop_time=0.1).message == ""
+    # on one axis the teeth have no lever
+    run = simulate(replace(known.parameters, ground_E_x=0.0), method=method, stop_time=0.1)
+    assert re.search(r"E\.fy.* not finite numbers at t = 0 s" if method == "compiled" else "crank.angle", run.message)
