@@ -311,7 +311,7 @@ def typed_value(text: str) -> Any:
 def unknown_name_error(name: str, known: Iterable[str], words: str) -> click.UsageError:
     """Return the error for an unknown name on the command line, with the most similar known names.
 
-    ``words`` stand for the name in the message.
+    ``words`` describe the name in the message, such as "interface 'cs' to check".
     """
     from ..files import unknown_name
 
@@ -336,7 +336,7 @@ _OTHERS = {
 
 
 def case_kind(tables: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the kind of a case file, such as `RUN`, by the names of its tables; None if the names do not tell."""
+    """Return the kind of a case file, such as `RUN`, by the names of its tables; None if they fit no kind."""
     from ..linkages import has_linkage
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, case_inputs
@@ -402,7 +402,7 @@ def changes(settings: Sequence[str], example: str) -> dict[str, Any]:
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str], *, runs: bool = True) -> Any:
     """Return the case of a file or of a published set, with the changes by ``--set``; print warnings about its masses.
 
-    If nothing ``runs``, the case need not say how long.
+    If ``runs`` is false, the case needs no stop time.
     """
     from ..run import describe_masses, load_case, published_case, read_case
 

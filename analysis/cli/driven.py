@@ -76,7 +76,7 @@ class CaseChoice:
         return rest_guess(self.case.parameters, drive, self.case.initial, speed, other=other)
 
     def has_crank_speed(self, drive: Any) -> bool:
-        """Return whether a torque drives the crank from a speed that is given, by --guess-speed or in the case."""
+        """Return whether a torque drives the crank and the speed at the start is given, by --guess-speed or in the case."""
         mechanism = find_mechanism(self.case.parameters)
         flow = drive.flow(mechanism)
         return bool(flow.torque and (self.guess_speed or mechanism.state(self.case.initial)[flow.places[-1]] > 0.0))
@@ -119,7 +119,7 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def swing_unit(orbit: Any, coordinate: int = 0) -> tuple[str, float, str]:
-    """Return the name of a free coordinate whose amplitude is printed, its printed unit's factor from SI, and this unit."""
+    """Return the name of a free coordinate, the factor from SI to the unit in which its amplitude is printed, and this unit."""
     what, si = orbit.swings[coordinate]
     unit, factor = display_scale(si)
     return what, factor, unit

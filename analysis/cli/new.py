@@ -47,7 +47,7 @@ _REQUIRED: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-#: Example of a tuning that succeeds within seconds.
+#: Entries of an example of tuning, which succeeds within seconds.
 _WISH: Mapping[str, Any] = {
     "speeds": ["570 rpm", "600 rpm"],
     "change": {"slider.stiffness": "10 %"},
@@ -116,7 +116,7 @@ def _value(variable: Any, value: Any) -> Any:
 def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
     """Return the lines of the parameters of a mechanism's first published set, by name.
 
-    With ``sections`` the masses of links are computed from their cross sections, and are only comments.
+    With ``sections`` there are lines for the cross sections of links; the masses that follow from them are comments.
     """
     from ..files import line
     from ..run import read_parameters

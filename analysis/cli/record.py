@@ -145,8 +145,9 @@ def _result_rows(
 ) -> list[tuple[str, float, float, str]]:
     """Return the results of a fitted decay as rows (name, value, standard error, unit).
 
-    With a mass or moment of inertia ``moving`` there are rows of damping and stiffness, in the units ``si``. With ``friction``
-    there are rows of dry friction; of its force only if ``size``, the size of ``unit`` in SI, is known.
+    If the mass or moment of inertia ``moving`` is given, there are rows of damping and stiffness, in the units ``si``. With
+    ``friction`` there is a row of dry friction over the stiffness. There is also a row of dry friction itself if ``moving`` is
+    given and ``size``, the size of ``unit`` in SI, is finite.
     """
     natural, error = decay.natural_frequency, decay.natural_frequency_error
     rows = [

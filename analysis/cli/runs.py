@@ -279,8 +279,8 @@ def check(
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
     """Return the FMUs to check as (path, interface, interface in words), one for each interface of each FMU.
 
-    The FMUs are ``fmu`` if it is given, otherwise all FMUs of the model in the folder build. With ``only`` just this interface
-    is returned.
+    The FMUs are ``fmu`` if it is given, otherwise all FMUs of the model in the folder build. If ``only`` is given, the
+    other interfaces are left out.
     """
     from ..run import CHECKED, list_interfaces
 
@@ -300,8 +300,8 @@ def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path
 def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
     """Return the cases to check, with their names: the standard cases and case files in ``names``.
 
-    Without names they are one standard case for each mechanism, or all standard cases if ``everything``. If an FMU is given,
-    only standard cases of its mechanism are taken.
+    If there are no names, return one standard case for each mechanism. If ``everything`` is true, return all standard cases.
+    In both cases, if an FMU is given, return only standard cases of its mechanism.
     """
     from ..mechanisms import find_mechanism
     from ..run import CASES, list_interfaces, load_case, read_description

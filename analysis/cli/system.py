@@ -175,9 +175,8 @@ def run(
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
     """Check the connections of a system. For a description also measure how the error of each coupling depends on the step.
 
-    This needs the equations of all parts, and is left out if a part is an FMU.
-    The step is the communication step. The reference for the errors is the system as a single model, solved by SciPy with a
-    tolerance of 1e-12.
+    The measurement needs the equations of all parts, and is left out if a part is an FMU. The step is the communication step.
+    The reference for the errors is the system as a single model, solved by SciPy with a tolerance of 1e-12.
 
     \b
     Examples:
@@ -251,7 +250,7 @@ def draw(file: str, out: str) -> None:
 def host(file: str, out: str) -> None:
     """Build a system as one C program for real-time targets.
 
-    The program uses neither a heap nor Python. It reports the step times and the missed deadlines.
+    The program uses neither Python nor dynamic memory. It reports the step times and the missed deadlines.
 
     \b
     Examples:

@@ -21,7 +21,7 @@ from .sensitivity import report_sensitivity
 #: Default range of speeds relative to the least and to the greatest natural frequency; it contains 2, near which parametric
 #: resonance begins.
 _RANGE = (0.15, 2.3)
-#: Greatest difference of the starts of one motion, relative to their scale.
+#: Greatest difference, relative to their scale, of two starts that count as the same motion.
 _SAME_MOTION = 1e-3
 
 
@@ -94,7 +94,7 @@ def resonance(
     motion.
 
     An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed". If a branch
-    is not followed to an end of the range, or a doubled one is not found, notes say so, and the exit code is 3.
+    is not followed to an end of the range, or a branch of doubled period is not found, notes say so, and the exit code is 3.
 
     \b
     Examples:
@@ -217,7 +217,7 @@ def _range_ends(
 ) -> tuple[float, float]:
     """Return the ends of the range to follow, in SI; by default a range of speeds around the natural frequencies (rad/s).
 
-    The natural frequency is that of the spring alone, ``natural``; without it the mean frequencies of ``modes`` are used.
+    ``natural`` is the natural frequency of the spring alone; if it is None, the mean frequencies of ``modes`` are used.
     """
     from ..periodic import parameter_unit, speed_names
 
@@ -462,11 +462,10 @@ def _axis_range(
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any, *, begins: bool = False) -> Any:
-    """Print the verdict on the stability of the motion that is reached, which is returned.
+    """Print the verdict on the stability of the motion that the machine reaches, and return this motion.
 
-    For a five-bar the verdict by the linear equation is printed, too.
-
-    ``start`` is a guess of the motion; the machine is run up slowly, or begins there if ``begins``.
+    For a five-bar the verdict by the linear equation is printed, too. ``start`` is a guess of the motion. The machine is run up
+    slowly; if ``begins`` is true, it begins at ``start`` instead.
     """
     from ..periodic import reached_orbit
     from ..youssef import linear_verdict

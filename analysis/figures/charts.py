@@ -30,7 +30,7 @@ _SIZE = 7.2, 4.6
 #: Classes of points by the number of stable motions, with their colours; class numbers for none, one and several of them.
 _SEVERAL = {"one stable motion": "#C6DFF0", "several stable motions": "#F6C99F", "unstable motions only": "#E58267"}
 _BY_COUNT = np.array([2.0, 0.0, 1.0])
-#: Legend entries of initial conditions that settle to no known motion, by their number in `Basins.ends`.
+#: Legend entries of initial conditions that settle to no known motion, by the number that marks them in `Basins.ends`.
 _LOST = {-1: "comes to the limit of assembly", -2: "ends in none of them, as far as it was followed"}
 #: Colours in the legend of values below and above the middle of a scale.
 _BELOW, _ABOVE = "#6AACD0", "#E58267"
@@ -301,6 +301,6 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
 
 
 def _nearest_turn(found: Basins, position: float) -> float:
-    """Return a coordinate of a motion at crank angle 0; for an angle, within half a turn of the middle of the plane."""
+    """Return the coordinate ``position`` of a motion; an angle is moved by whole turns to within half a turn of the middle."""
     way, middle = found.motions[0].flow.angle_periods[found.place], 0.5 * (found.position[0] + found.position[-1])
     return float(position - way * np.round((position - middle) / way) if way else position)

@@ -59,9 +59,10 @@ class DrawingError(LinkworkError, TypeError):
 
 
 def _registered_function(pictures: Any, result: object, name: str) -> Callable[..., Any]:
-    """Return the function registered for the type of a result; raise DrawingError with a ``name`` if there is none.
+    """Return the function registered for the type of a result; raise DrawingError if there is none.
 
     ``pictures`` is a single-dispatch function such as `plot`; `MODULES` are imported until one registers the type.
+    ``name`` is what the error says is missing, such as "plot".
     """
     nothing = pictures.dispatch(object)
     for module in MODULES:

@@ -19,7 +19,7 @@ from .style import HAIR, MARK, MARKED, TINY, Figure
 
 #: Matplotlib's gid of vertical lines and their names, and of the texts of points.
 _GID, _LABEL = "mark", "label"
-#: Look of these texts; their positions are offsets from the line or point that they name.
+#: Look of the names and texts; the position of each is an offset from its line or point.
 _TEXT: dict[str, Any] = {"textcoords": "offset points", "fontsize": TINY, "color": MARKED}
 #: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
@@ -248,9 +248,9 @@ def roomiest_position(
 ) -> FloatArray:
     """Return the position of a letter, at a distance ``reach`` from a pin, that is farthest from other shapes.
 
-    If there is no room for a letter at this distance, the position is farther from the pin.
-    ``drawn`` are Shapely geometries. Distances from pins and other letters (``marks``) are multiplied by 0.6. Of positions with
-    equal room the one in the direction ``away`` is preferred; the longer this vector, the greater its weight.
+    If there is no room for a letter at this distance, the position is farther from the pin. ``drawn`` are Shapely
+    geometries. Distances from pins and other letters (``marks``) are multiplied by 0.6. Of positions with equal room the one in
+    the direction of the vector ``away`` is preferred; the longer ``away``, the greater its weight.
     """
     import shapely
 

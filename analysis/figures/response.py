@@ -222,7 +222,7 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
 
 
 def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
-    """Return labels with speed and amplitude for the prominent stable peaks of a branch."""
+    """Return labels with speed and amplitude for the prominent stable peaks of a branch; the y axis ends at ``top``."""
     x, y = branch.parameter, look.scale * branch.amplitude
     found = [n for n, prominence in peaks(y) if prominence >= _STANDS_OUT * top]
     labels = []
@@ -236,7 +236,10 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
 
 
 def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Label]:
-    """Return labels for the special points, apart from folds, that a machine reaches; points close together share one."""
+    """Return labels for the special points, apart from folds, that a machine reaches; the y axis ends at ``top``.
+
+    Points close together have one common label.
+    """
     # a point on two branches, or passed twice, is named once
     met = {
         (special.kind, look.place(special.parameter)): special
@@ -454,7 +457,10 @@ def _comparison_points(branch: Branch) -> NDArray[np.int64]:
 def _visible_approximations(
     others: Sequence[_Approximation], branches: Sequence[Branch], look: _Scale, top: float
 ) -> list[Curve]:
-    """Return the curves of the approximations that differ visibly from the true motion in a figure of usual size."""
+    """Return the curves of the approximations that differ visibly from the true motion in a figure of usual size.
+
+    The y axis ends at ``top``.
+    """
     if not others:
         return []
     x = look.factor * others[0].parameter
@@ -522,7 +528,7 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
 def _without_overlaps(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
     """Return letters without those that overlap others.
 
-    ``width`` is the length of the panel's x axis, ``ratio`` the quotient of the ends of its logarithmic y axis.
+    ``width`` is the range of the panel's x axis, ``ratio`` the quotient of the ends of its logarithmic y axis.
     """
     points = 72.0 * 0.85 * np.array([_SIZE[0], 0.75 * _HARMONICS * _SIZE[1]]) / (width or 1.0, np.log(ratio))
     taken: list[FloatArray] = []

@@ -106,13 +106,14 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
     """Plot many runs: the median of outputs over time, and the ranges in which 90 % of the runs and all runs are.
 
     Median and ranges at a time are those of the runs that reach this time; the foot says how many do not reach the end. The
-    angles of a link begin within half a turn of that of the first run.
+    angle of a link begins, in each run, within half a turn of its angle in the first run.
 
     Parameters
     ----------
     runs : Ensemble
     names : sequence of str, optional
-        Outputs to plot, one panel each; by default the first eight that were chosen, or the coordinates.
+        Outputs to plot, one panel each; by default the first eight outputs that the ensemble was asked for
+        or, if it was asked for none, the coordinates.
     title : str
     """
     require_list(names, "names")
@@ -214,7 +215,7 @@ def _mechanism(run: Trajectory) -> Mechanism:
 
 
 def _variables(run: Trajectory) -> dict[str, Variable]:
-    """Return the variables of a run's outputs by name, also of outputs that belong to other mechanisms."""
+    """Return the variables of a run's outputs by name, even if an output belongs to another mechanism."""
     mechanisms = (*MECHANISMS.values(), _mechanism(run))
     return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
 

@@ -74,7 +74,7 @@ def name_in_words(name: str) -> str:
 
 
 def axis_label(name: str, unit: str) -> str:
-    """Return the label of a low axis: the name in words over its unit, long names in two lines."""
+    """Return the label of a y axis of small height: the name in words over its unit, long names in two lines."""
     lines = wrap(name_in_words(name), 22)
     return "\n".join(lines) + (" " if len(lines) > 1 else "\n") + f"[{unit}]"
 

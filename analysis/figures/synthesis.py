@@ -202,7 +202,7 @@ def _plot_magnified_errors(axis: Axes, scene: syn.LinkageScene) -> None:
 
 
 def _function_scale(scene: syn.LinkageScene) -> tuple[str, str, float]:
-    """Return the heading of a function's values in `LinkageScene.stations`, the label of their axis and its factor from SI."""
+    """Return a function's heading in `LinkageScene.stations`, the label of its axis, and the factor from SI to the axis."""
     if scene.target is None:
         return "target angle [rad]", "rocker angle [deg]", float(np.degrees(1.0))
     return "target x [m]", "slider position x [mm]", MM_PER_METRE
@@ -231,7 +231,7 @@ def _plot_function(axis: Axes, scene: syn.LinkageScene) -> None:
 
 
 def _within_task(scene: syn.LinkageScene, turns: FloatArray) -> NDArray[np.bool_]:
-    """Return which crank rotations (deg) the task uses."""
+    """Return a mask of the crank rotations ``turns`` (deg) that the task uses."""
     begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
     return np.asarray((turns >= begin - 1e-9) & (turns <= end + 1e-9))
 

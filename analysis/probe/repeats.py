@@ -117,7 +117,7 @@ def check_serializing(context: Context, case: int) -> None:
 
 
 def check_deserializing(context: Context, case: int) -> None:
-    """Restore a state that `check_serializing` wrote in another process; check that the run from it has the values recorded."""
+    """Restore a state that `check_serializing` wrote in another process; check that a run from it has the recorded values."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
         context.say("not made: no bytes were written")

@@ -272,7 +272,7 @@ def _command(work: Path, *words: str) -> dict[str, Any]:
 
 @contextmanager
 def _parent_of_jobs(work: Path) -> Iterator[subprocess.Popen[bytes] | None]:
-    """Yield a process that forks the processes of jobs; None except on Linux, because elsewhere forking would not be safe."""
+    """Yield a process that forks the processes of jobs; except on Linux yield None, as forking is not safe there."""
     if sys.platform != "linux":
         yield None
         return

@@ -12,7 +12,8 @@ from .model import Model, Variable
 from .session import ProbeError
 from .walk import derivative_arguments
 
-#: Steps of the finite differences, relative to the size of the known; the closest difference counts.
+#: Steps of the finite differences, relative to the size of the known; a derivative is compared
+#: with the difference nearest to it.
 _DIFFERENCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: A derivative is wrong if it differs from the closest finite difference by more than this share of the largest derivative of
 #: the same unknown.
@@ -49,7 +50,7 @@ def _floor(unknown: Variable) -> float:
 
 
 def _run_at_random_state(context: Context, case: int) -> Run:
-    """Return a run in a mode in which derivatives may be read: continuous-time mode; in co-simulation initialization mode."""
+    """Return a run in which derivatives may be read: in continuous-time mode, or for co-simulation in initialization mode."""
     exchange = context.model.interface == "me"
     run = Run(context.session(), finish=exchange)
     for inputs in random_inputs(context.random(case), context.model, 5 * case) if exchange else ():

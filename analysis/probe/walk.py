@@ -116,7 +116,7 @@ class Walk:
                 return
 
     def go(self, target: str, most: int = 2) -> bool:
-        """Walk to the state ``target``, with up to ``most`` random calls in each state on the way; return success."""
+        """Walk to the state ``target``, with up to ``most`` random calls in each state passed; return whether it is reached."""
         if target == "ready" and self.model.version == 3:
             return False
         for function in self.machine.path(target, self.session.event_mode) or []:
@@ -319,7 +319,7 @@ def derivative_arguments(
 
 
 def _time_derivatives(causality: str) -> Callable[[Walk], list[Any] | None]:
-    """Return the arguments of a call that gets the first time derivative of an output, or sets that of an input."""
+    """Return a function that makes the arguments of a call to get an output's time derivative, or to set an input's."""
 
     def arguments(walk: Walk) -> list[Any] | None:
         known = walk.model.variables

@@ -145,7 +145,7 @@ class Worker:
 
 
 def _mechanism(request: Mapping[str, Any]) -> Mechanism | None:
-    """Return the mechanism of a job's state, which another process must get to know if it is described; None if unknown."""
+    """Return the mechanism of a job's state, which the worker's process needs if it is described; None if it is unknown."""
     state = request.get("state")
     name = state.get("mechanism") if isinstance(state, Mapping) else None
     return MECHANISMS.get(name) if isinstance(name, str) else None

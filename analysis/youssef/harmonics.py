@@ -61,7 +61,7 @@ class HarmonicMotion:
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest slider position."""
+        """Half the distance between the least and the greatest value of the series."""
         return float(_half_ranges(self.series.cos[None, :], self.series.sin[None, :])[0])
 
     def harmonic(self, n: int) -> float:
@@ -69,7 +69,7 @@ class HarmonicMotion:
         return float(self.series.amplitudes[n]) if n <= self.order else 0.0
 
     def position(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Return the slider positions at crank angles (rad), as an array of the angles' shape."""
+        """Return the values of the series at crank angles (rad), as an array of the angles' shape."""
         return self.series(angle)
 
 

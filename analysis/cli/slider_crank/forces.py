@@ -74,7 +74,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     """Return the rows of a table: least and greatest value of each quantity, with the crank angles at which they occur.
 
     ``frames`` are the numbers of the frames in which joint forces are given. Forces and torques near singular angles are left
-    out. A constant has no crank angles.
+    out. A constant quantity has no crank angles.
     """
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),

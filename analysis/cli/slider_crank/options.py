@@ -112,7 +112,7 @@ class MechanismChoice:
         return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
     def turn(self, *, at: float | None = None) -> ForceTurn:
-        """Solve the force problem at crank angles over a turn, and ``at`` one further crank angle (rad).
+        """Solve the force problem at crank angles over a turn, and at one further crank angle ``at`` (rad).
 
         Angles at which the mechanism cannot be assembled are left out, with a note.
         """
@@ -260,8 +260,8 @@ def add_mechanism_options(command: Command) -> Command:
 def problem_options(points: int) -> Callable[[Command], Command]:
     """Return a decorator that adds the options of a force problem: --torque, --load, --points and --speed.
 
-    `add_mechanism_options`, which must come above it, puts their values into the `MechanismChoice`. ``points`` is the default
-    of --points.
+    `add_mechanism_options`, which must stand above this decorator, puts the values into the `MechanismChoice`. ``points`` is
+    the default of --points.
     """
     options = (
         speed_option,

@@ -207,7 +207,10 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
 
 
 def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
-    """Print the linear estimate and the statistics of the samples at one crank angle; "±" is two standard errors."""
+    """Print the linear estimate and the statistics of the samples at one crank angle; "±" is two standard errors.
+
+    ``place`` is the index of the crank angle.
+    """
     rows = []
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
