@@ -68,7 +68,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
 
 
 def free_position_name(mechanism: Mechanism, stiffness: str) -> str:
-    """Return the FMI name of the position where a spring with the named stiffness exerts no force; empty if always 0."""
+    """Return the FMI name of the position where the spring with the named stiffness exerts no force; empty if always 0."""
     owner = stiffness.rpartition(".")[0] + "."
     return next((name for name in mechanism.names("spring") if name.startswith(owner)), "")
 

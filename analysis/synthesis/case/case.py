@@ -113,7 +113,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """Check the greatest error that is allowed when pin forces are minimised: a length, or for a rocker function an angle."""
+    """Check the greatest error that is allowed while pin forces are minimised: a length, or for a rocker function an angle."""
     try:
         quantity(value, "m", name)
     except ParameterError:
@@ -124,28 +124,28 @@ def _error(value: Any, name: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]`` of a case file; None in ``least_transmission_angle`` leaves the transmission angle free.
+    """The table ``[constraints]`` of a case file; false in ``least_transmission_angle`` is read as None.
 
     Attributes
     ----------
     least_transmission_angle : float
-        0 only requires a full turn of the crank, false requires nothing.
+        Least value; 0 only requires that the crank turns fully, false requires nothing.
     over : "turn" or "task"
-        Where the transmission angle is bounded: over a turn, or at the stations only.
+        Where the transmission angle is bounded: over a turn, or only during the task.
     full_turn : bool
-        The crank turns fully.
+        Whether the crank must turn fully.
     grashof : str
-        Type of the four-bar.
+        Required Grashof type of the four-bar.
     stroke : (float, float)
-        Travel of the slider of a slider-crank.
+        Bounds of the travel of a slider-crank's slider.
     largest_link : float
-        Greatest length of the links, and of the coupler point's distance from B.
+        Greatest length of the links, and greatest distance of the coupler point from B.
     assembly : int
-        1: C to the left of B -> D; -1: to the right.
+        1 if C must lie to the left of B -> D, -1 if to the right.
     pivot_A, pivot_D : list
-        Corners [[x, y], ...] of a polygon in which the pivot lies.
+        Corners [[x, y], ...] of a polygon in which the pivot must lie.
     time_ratio : (float, float)
-        Bounds of the time ratio: duration of a crank-rocker's slow swing divided by that of its quick one.
+        Bounds of the time ratio: duration of a crank-rocker's slow swing divided by the duration of its quick swing.
     least_mechanical_advantage, greatest_mechanical_advantage : float
         Bounds of the mechanical advantage: torque on the rocker divided by torque on the crank.
     mechanical_advantage_at : list
@@ -157,9 +157,9 @@ class Constraints:
     no_toggle : (float, float)
         Crank rotations between which there is no toggle.
     max_pin_force : float
-        Greatest force on any pin, at the speed and under the load of ``make``.
+        Greatest force on any pin, at the speed and under the load of the table ``[make]``.
     least_pin_force_within : float
-        Minimise the greatest pin force, among linkages whose greatest error is no larger than this.
+        Bound of the greatest error of the linkage, while the greatest pin force is minimised.
     pins : str
         Letters of the pins whose forces count.
     require : list

@@ -136,7 +136,7 @@ def _rotation(value: Any, *targets: FloatArray) -> FloatArray | None:
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
     """Read the weights of targets, given as a list or as windows of crank rotations; see `Window`.
 
-    For an untimed task, with n targets, the windows are ranges of point indices. A window includes its ends; one of crank
+    For an untimed task, with n targets, the windows are ranges of point indices. A window includes its ends. A window of crank
     rotations holds in every turn, so that it may pass the start of the task.
     """
     if value is None:
@@ -186,15 +186,15 @@ class _ObjectiveAndRange:
     Attributes
     ----------
     n : int
-        Number of steps of a formula, 72 by default.
+        Number of steps of a formula's parameter, 72 by default.
     start, end : float or str
         Range of the parameter t of a formula: an angle, or a formula such as "2*pi".
     unit, angle_unit : str
-        Unit of numbers without one.
+        Unit of numbers that are written without a unit.
     rotation : list or Steps
         Crank rotations as a list, or { from = "0 deg", to = "120 deg" }.
     weights : list
-        One per target, or windows [{ from = "60 deg", to = "260 deg", weight = 1000 }].
+        One weight per target, or windows [{ from = "60 deg", to = "260 deg", weight = 1000 }] of crank rotations.
     """
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
@@ -218,11 +218,11 @@ class _Curve(_ObjectiveAndRange):
     points : list
         Points [x, y] in the order in which they are passed.
     file : str
-        CSV with two columns, or SVG, instead of points.
+        Name of a CSV file with two columns, or of an SVG file, instead of points.
     name : str
         id of the element of an SVG file.
     closed : bool
-        Whether the last point is followed by the first.
+        Whether the curve continues from its last point to its first.
     x, y : str
         Formulas of t instead of points, such as "60*cos(t)".
     scale, turn, shift : float, float, list
@@ -299,7 +299,7 @@ class UntimedPathTable(_Curve):
     smoothing : Smoothing
         true, or { points = 180, deviation = "0.5 mm" }, for curves drawn by hand.
     weights : list
-        One per point, or windows [{ from = 0, to = 3, weight = 10 }] of numbers of points.
+        One weight per point, or windows [{ from = 0, to = 3, weight = 10 }] of point indices.
     """
 
     measure: Any = entry(Choice(("area", "distance")), "area")
@@ -384,9 +384,9 @@ class RockerFunctionTable(_ObjectiveAndRange):
     angle : list or str
         Angles of the rocker from the ground link, or a formula of the crank rotation t in rad.
     file : str
-        CSV with two columns, rotation and angle, instead of angles.
+        Name of a CSV file with two columns, rotation and angle, instead of angles.
     spacing : str
-        Places of a formula's points.
+        Spacing of a formula's points: equal steps, or Chebyshev's precision points.
     """
 
     angle: Any = entry(any_value, None)
@@ -428,7 +428,7 @@ class SliderFunctionTable(_ObjectiveAndRange):
     Attributes
     ----------
     position : list or str
-        Places of the slider along the x axis, or a formula of the crank rotation t in rad.
+        Positions of the slider along the x axis, or a formula of the crank rotation t in rad.
     """
 
     position: Any = entry(any_value)
@@ -457,7 +457,7 @@ class QuickReturnTable:
     Attributes
     ----------
     time_ratio : float
-        Duration of the slow stroke or swing over that of the quick one, 1 or greater.
+        Duration of the slow stroke or swing divided by the duration of the quick one, 1 or greater.
     """
 
     stroke: float | None = entry(Quantity("m", above=0.0), None)

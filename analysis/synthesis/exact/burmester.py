@@ -36,7 +36,7 @@ Poses = PrecisionPoints | Motion
 INDEPENDENT = 1e-10
 #: Largest imaginary part, in units of the poses' size, with which a dyad counts as real.
 REAL = 1e-7
-#: Distance, in units of the poses' size, beyond which an end of a dyad counts as infinite: a slide is in its place.
+#: Distance, in units of the poses' size, beyond which an end of a dyad counts as infinitely far: a slide replaces the dyad.
 FAR = 1e3
 #: Distance, in the same units, up to which two places count as one: the roots of a multiple dyad differ by rounding.
 SAME = 1e-5
@@ -99,7 +99,7 @@ class Guidance(Exact):
     complex_dyads : int
         Number of complex dyads, which cannot be built.
     slides : int
-        Number of dyads with an end at infinity: a slide guides the body in their place, and no four-bar contains them.
+        Number of dyads with an end at infinity: a slide replaces such a dyad, and no four-bar contains it.
     nearest_complex : float
         Least imaginary part of the complex dyads, as a fraction of the poses' size. If this number is close to zero, a small
         change of the poses makes a pair of dyads real. Infinite if all dyads are real.
@@ -400,8 +400,8 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
     ``sides`` has the assembly at each target: +1 with C to the left of B -> D, -1 to the right. If the targets need both
     assemblies, there is a branch defect. By Grashof's criterion the two assemblies are two circuits if the crank or the ground
-    link is the shortest; if another link is, the circuits differ by the side of the ground link on which the crank lies. All
-    other linkages have one circuit.
+    link is the shortest; if the coupler or the rocker is the shortest, the circuits differ by the side of the ground link on
+    which the crank lies. All other linkages have one circuit.
     """
     verdicts = judge(linkage, rotation, closed=False)
     one_side, circuit = bool((sides == sides[0]).all()), True
@@ -465,7 +465,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _pivot_line(row: FloatArray, z: complex) -> FloatArray:
-    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot m of a point z; each is linear in z."""
+    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot m of a point z; a, b and c are linear in z."""
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
     return np.array([row[3] - turned.real, row[4] - turned.imag, constant])

@@ -513,7 +513,7 @@ def _best_coupler(
     """Find the coupler length, between two bounds, that minimises the cosine of the transmission angle.
 
     ``margins`` are functions of this length that are zero where a bound of another link is reached: the search includes these
-    lengths, which may be the only ones if that link is fixed.
+    lengths, which may be the only possible ones if the length of the other link is fixed.
     """
     couplers = np.linspace(*ends, COUPLERS)
     values = np.array([margins(float(l3)) for l3 in couplers])
@@ -552,7 +552,10 @@ class _SwingShapes:
         return np.array([hypot(x, y), l2, l3, 1.0]), l2 > 0.0 and sides[0] * sides[1] > 0.0
 
     def margins(self, l3: float) -> FloatArray:
-        """Return functions of the ratio l3 that are zero where two bounds of links allow a single size."""
+        """Return a value for each pair of a lower and an upper bound of links: zero if the pair allows a single size only.
+
+        ``l3`` is the ratio of coupler to rocker.
+        """
         found, _ = self.ratios(l3)
         least, most = self.least[:, None] * found, np.where(np.isfinite(self.most), self.most, 0.0)[:, None] * found
         return (least - most.T)[:, np.isfinite(self.most)].ravel()
@@ -599,7 +602,7 @@ class _SwingShapes:
 def _read_bounds(bounds: Any, names: Sequence[str], links: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Return the least and greatest length of each dimension in ``names`` (m): as given, or zero and infinity.
 
-    ``links`` are the names of those that cannot be zero.
+    ``links`` are the names of the dimensions that cannot be zero.
     """
     given = check_bounds(bounds)
     for name in given:

@@ -114,14 +114,16 @@ class MachineSpec:
     slider_mass, slider_stiffness, slider_damping : float, optional
         Properties of the slider that carries D (kg, N/m, N.s/m); by default those of a block on a spring so stiff that D
         hardly moves.
-    slider_coulomb_friction, slider_spring_free_position : float
-        Coulomb friction of the slider (N); slider position at which its spring is free (m).
+    slider_coulomb_friction : float
+        Coulomb friction of the slider (N).
+    slider_spring_free_position : float
+        Slider position at which the slider's spring exerts no force (m).
     gravity : float
         Acceleration of gravity (m/s2).
     speed : float
         Crank speed (rad/s).
     crank_mass, coupler_mass, rocker_mass : float, optional
-        Masses that replace those from density and section (kg); the moments of inertia change in proportion.
+        Masses of links that replace the masses from density and section (kg); the moments of inertia change in proportion.
     load : (float, float)
         Components of the force at the coupler point P along the axes of the plane (N).
     """
@@ -575,5 +577,5 @@ def _require_fixed_pivot(linkage: Linkage) -> None:
 
 
 def _linear_root(gap: Callable[[float], float]) -> float:
-    """Return the cosine at which a condition is zero, which is linear in the cosine."""
+    """Return the cosine at which ``gap``, a linear function of the cosine, is zero."""
     return gap(0.0) / (gap(0.0) - gap(1.0))

@@ -155,7 +155,7 @@ class LinkageScene:
         return np.column_stack([ends.real, ends.imag])
 
     def guide_directions(self) -> tuple[FloatArray, FloatArray]:
-        """Return the unit vectors along the guide and to its left; the guide of a slider that rests is level."""
+        """Return the unit vectors along the guide and to its left; a slider without travel has a level guide."""
         assert self.guide is not None
         way = self.guide[1] - self.guide[0]
         length = hypot(*way)
@@ -292,7 +292,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     )
 
 
-#: What a further position shows of the coupler beside B -> C, by `_coupler_line`.
+#: Letters of the line with which a further position shows the coupler in addition to B -> C, by the result of `_coupler_line`.
 _BESIDE = {"": "BPC", "BC": "", "BP": "CP", "PC": "BP"}
 
 
@@ -543,11 +543,11 @@ def neglected_load(linkage: Linkage, make: MachineSpec) -> str:
 def settle_slider(
     parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
 ) -> tuple[float, float]:
-    """Find the position (m) and velocity (m/s) to which a slider returns after a run of ``duration`` (s), else zeros.
+    """Find the position (m) and velocity (m/s) to which a slider returns after ``duration`` (s); zeros if none is found.
 
-    After a turn at constant speed this is the steady motion at ``crank_angle``, with the crank at rest the equilibrium. The run
-    is repeated at most `SETTLING` times until the slider is within a millionth of its travel. SciPy's method is used: to
-    compile the solver would take longer.
+    If the run is a turn at constant speed, the result belongs to the steady motion at ``crank_angle``; if the crank is at rest,
+    to the equilibrium. The run is repeated, at most `SETTLING` times, until the slider returns to within a millionth of its
+    travel. SciPy's method is used: to compile the solver would take longer.
     """
     slider = 0.0, 0.0
     for _ in range(SETTLING):

@@ -34,15 +34,18 @@ FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
 #: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: A direction is scaled by its mean square displacement; this fraction of the greatest one is added, to limit the scaling.
+#: A direction is scaled by its mean square displacement. This fraction of the greatest displacement is added, to limit the
+#: scaling.
 STIFF = 1e-6
 #: Least number of pieces of the target at which distances are computed.
 PIECES = 360
-#: To minimise the greatest distance, first every STRIDE-th distance is bounded, then all of at least GREAT times the greatest.
+#: To minimise the greatest distance, first every STRIDE-th distance is bounded, then all distances of at least GREAT times the
+#: greatest distance.
 STRIDE, GREAT = 3, 0.5
 #: Greatest rotation of the first station from its former place, and least rotation between successive stations (rad).
 WINDOW, APART = 0.6, 1e-10
-#: Fraction by which the bound of the greatest distance may be exceeded: its points on the curve change from step to step.
+#: Fraction by which the bound of the greatest distance may be exceeded: the points of the curve with the greatest distance
+#: change from step to step.
 WITHIN = 1e-5
 #: Index of the crank phase, which does not affect a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")

@@ -31,9 +31,10 @@ from .statement import FURTHER, GRID, SOUGHT, Statement, convert_to_si, pivot_si
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
-#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution. The greatest error
-#: of a linkage with a fixed pivot is minimised with adaptive small steps: monotone ones stall at a degenerate optimum. So is a
-#: function in place of an error if larger steps leave the bounds, which the start keeps, and do not come back.
+#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution. Adaptive small steps
+#: are taken in two cases: for the greatest error of a linkage with a fixed pivot, where monotone steps stall at a degenerate
+#: optimum; and for a function that is minimised in place of an error, if larger steps leave the bounds, within which the start
+#: lies, and do not come back.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},

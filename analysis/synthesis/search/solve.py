@@ -577,8 +577,8 @@ def trade_off(
     """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
     From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the previous
-    problem. A second pass in the opposite direction uses the solution of a tighter limit for the next looser limit as well,
-    unchanged or optimised again: it meets the looser limit, too. Thus the error can only grow as the limit is tightened.
+    problem. A solution of a tighter limit also meets the next looser limit: a second pass in the opposite direction uses it for
+    this limit as well, unchanged or optimised again. Thus the error can only grow as the limit is tightened.
 
     Parameters
     ----------

@@ -499,8 +499,9 @@ class Statement:
     def _bound_reach(self, p: Any, v: Any, x: Any, step: Any, least: float, tilt: Any) -> None:
         """Bound the transmission angle of a linkage with a moving pivot at rotations x, which are ``step`` apart.
 
-        Unless linkages are only judged, the angle is bounded between these rotations, too: there the squared distance BD does
-        not pass an extreme beyond its tangents at the rotations, each half a step long to either side.
+        Unless linkages are only judged, the angle is bounded between these rotations, too: at each rotation the tangent of the
+        squared distance BD is drawn half a step to either side, and its ends are bounded. An extreme between two rotations does
+        not lie beyond the tangents.
         """
         if self._judged:
             d2 = self._squared_reach(p, v, x)

@@ -171,7 +171,10 @@ class Limits:
         return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
 
     def admits(self, linkage: Linkage) -> bool:
-        """Return whether a linkage has the kind and gear ratio of these limits; a pivot on a guide counts as a four-bar's."""
+        """Return whether a linkage has the kind and gear ratio of these limits.
+
+        A linkage with a pivot on a guide counts as a four-bar.
+        """
         if self.linkage is FiveBar:
             return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
         return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)

@@ -251,7 +251,7 @@ class RockerFunction:
     mounting : bool
         Whether the output may be mounted on the rocker at any angle.
     objective : "error" or "worst"
-        What is minimised: the quality function, or the greatest error, as in `TimedPath`.
+        What is minimised: the quality function, or the greatest weighted error.
     """
 
     angle: ArrayLike
@@ -329,8 +329,10 @@ class PrecisionPoints:
     ----------
     points : ndarray, shape (n, 2)
         Points in the order in which they are passed (m).
-    angle, rotation : ndarray, shape (n,), optional
-        Directions of the carried body, and crank rotations (rad).
+    angle : ndarray, shape (n,), optional
+        Direction of the carried body at each point (rad).
+    rotation : ndarray, shape (n,), optional
+        Crank rotation at each point (rad).
     length : float, optional
         See `Motion`.
     objective : "error" or "worst"
@@ -369,7 +371,7 @@ def _extent(points: FloatArray) -> float:
 
 
 def _leverage(length: float | None, points: FloatArray) -> float:
-    """Return the length by which an angular error counts as an error of position (m/rad), as given or by default."""
+    """Return the length that converts an angular error to an error of position (m/rad): as given, or the default."""
     if length is None:
         return 0.5 * (_extent(points) or TURNED)
     if not (isfinite(length) and length > 0.0):
