@@ -27,7 +27,7 @@ from tests.systems.conftest import started_in_its_modes
 
 #: Number of communication steps of a run at the greatest step.
 POINTS = 20
-#: Other masters, and whether they need FMUs with the values of their modes as start values, since they set no integers.
+#: Other masters, each with whether it sets no integers and therefore needs FMUs that start in the modes of the system.
 MASTERS = {
     "FMPy": (masters.by_fmpy, False),
     "libcosimpy": (masters.by_libcosimpy, False),

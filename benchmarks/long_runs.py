@@ -79,7 +79,7 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
 def compare_late_run(what: str, **options: Any) -> tuple[float, float]:
     """Compare a run of half a second that begins at the time `LATE` (s) with a run that begins at zero.
 
-    ``what`` is the name of their inputs in `ACTING`.
+    ``what`` is the name of the inputs of both runs in `ACTING`.
 
     Returns
     -------

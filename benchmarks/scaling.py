@@ -87,7 +87,7 @@ def import_packages(_: int) -> None:
 
 
 def measure(backends: tuple[str | None, ...], repeats: int) -> list[list[list[tuple[float, float, Any]]]]:
-    """Time each kind of work on each backend, the backends in turn; return what `time_work` does, by work and backend."""
+    """Time each kind of work on each backend, the backends in turn; return the results of `time_work`, by work and backend."""
     for backend in filter(None, backends):
         with joblib.parallel_config(backend, n_jobs=2):
             list(run_in_parallel(import_packages, range(8)))

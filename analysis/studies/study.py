@@ -61,8 +61,8 @@ class StudyResult:
 class Study:
     """Study of a figure of a thesis, or of statements without a figure: the functions that compute, draw and animate it.
 
-    ``sweeps`` are the parameters whose values the study itself compares; the reader cannot set them. ``number`` is that in the
-    list of studies; `load` sets it.
+    ``sweeps`` are the parameters whose values the study itself compares; the reader cannot set them. ``number`` is the study's
+    number in the list of studies; `load` sets it.
     """
 
     computed: Callable[[], StudyResult]

@@ -142,7 +142,8 @@ def _independent() -> tuple[int, float]:
 def _joint_freedoms() -> tuple[tuple[int, int], ...]:
     """Return the rotations and translations of each joint 1 to 4 by eqs 1 to 4.
 
-    The rank of the derivatives of the joint's matrix is the number of both, the rank of the real parts that of the rotations.
+    The rank of the derivatives of a joint's matrix is the number of rotations and translations together; the rank of their
+    real parts is the number of rotations.
     """
 
     def ball(th: float, eta: float) -> Dual:
@@ -293,8 +294,8 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
 def _inverse_difference(case: Case) -> float:
     """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections of a turn.
 
-    A^-1 is the inverse of L457, computed from singular values. A first correction is one from the solution at the previous
-    angle.
+    A^-1 is the pseudo-inverse of A that line L457 defines, here computed from singular values. A first correction is one from
+    the solution at the previous angle.
     """
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     start = np.roll(case_turn(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]

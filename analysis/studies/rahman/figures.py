@@ -415,7 +415,7 @@ def sinusoidal_axial_force() -> float:
     return float(np.abs(beyond[found.clear(CLEAR_DEG)]).max()) / POUND_FORCE
 
 
-#: The statements by the figure with which they are judged.
+#: Functions that judge the statements, by the figure with which the statements are judged.
 _JUDGED = {"R5": _motion, "R8": _forces, "R14": _bearing_moments, CONSTANT: _constant}
 
 

@@ -65,7 +65,7 @@ from .printed import (
 )
 from .table import COMPONENTS, Case
 
-#: Distance g3 (in) at which the terms of the slider's moment of mass count; the thesis computes with 0.
+#: Distance g3 (in) for judging the terms of the slider's moment of mass; they vanish at g3 = 0, with which the thesis computes.
 G3 = 2.0
 #: Sines and cosines printed in eqs 50a and 51a, and in eqs 52a and 53a (L704-726, L744-748).
 PRINTED_SINES = (24 + 114, 3)
@@ -169,7 +169,7 @@ def _both_paths(c: Crank, b: Bodies, q: Joints, r: Joints) -> tuple[tuple[Dual, 
 def replacements() -> list[Judged]:
     """Judge eqs 57 and 58 by comparison with eqs 55 and 56, in the plane and out of it.
 
-    All four have the printed rates and accelerations.
+    All four equations are evaluated with the printed rates and accelerations.
     """
     b, found = bodies(parameters()), []
     for case in (PLANE, *ROW_F):
@@ -424,7 +424,10 @@ def _expansion_differences() -> dict[str, FloatArray]:
 
 
 def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
-    """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q; ``general`` are its forces in a general position."""
+    """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q.
+
+    ``general`` has the forces by this solution in a general position.
+    """
     unsolved, (slip, *expanded) = _solution_residuals(), _expansion_differences().items()
     # 63d is the moment about j, 63e the force along k
     unmet = unsolved[1, [1, 0], [1, 2]]

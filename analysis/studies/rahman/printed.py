@@ -36,8 +36,8 @@ class Turn(NamedTuple):
 
     ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in). ``rotation_deg`` (m, n) is the rotation by which
     the loop is open, ``error_in`` (m, n) the error of S4. ``steps`` (m, n) are the numbers of corrections. ``settled`` (n,)
-    tells whether the last correction was small at every angle. A shift has NaN from the first angle at which the iteration
-    does not converge.
+    tells whether the last correction was small at every angle. The results of a shift are NaN from the first
+    angle at which the iteration does not converge.
     """
 
     unknowns: FloatArray
@@ -411,9 +411,10 @@ def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints,
 
 
 def _collected(v: Dual, g: float, squares: tuple[float, float, float]) -> Dual:
-    """Return the rate of a body's dual momentum divided by its mass; ``v`` is the rate of its dual velocity.
+    """Return the rate of a body's dual momentum divided by the body's mass.
 
-    ``g`` places its centre of mass, ``squares`` are its squared radii of gyration.
+    ``v`` is the rate of the body's dual velocity, ``g`` the x coordinate of its centre of mass, ``squares`` are its
+    squared radii of gyration.
     """
     (x, y, z), (xd, yd, zd), (kx, ky, kz) = v.real, v.dual, squares
     return _dual([xd, yd + g * z, zd - g * y], [kx * x, ky * y - g * zd, kz * z + g * yd])

@@ -62,7 +62,10 @@ def springs() -> tuple[float, ...]:
 
 
 def transient(stiffness: float, number: int = 0) -> float:
-    """Return the greatest distance of u from the steady motion in a turn after the start, relative to the range of u."""
+    """Return the greatest distance of u from the steady motion in a turn after the start, relative to the range of u.
+
+    ``number`` is the index of the turn; the first turn after the start has the index 0.
+    """
     steady = _steady(stiffness).slider_cm
     started = CM_PER_METRE * run_from_rest(stiffness)["slider.position"][360 * number : 360 * (number + 1)]
     return float(np.abs(started - steady[:-1:4]).max() / np.ptp(steady))
@@ -332,7 +335,10 @@ def torque_result() -> StudyResult:
 
 
 def _torques() -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, float]]:
-    """Return crank angles (deg), the torques with three springs, and where that with 1e6 dyn/cm is greatest and least."""
+    """Return crank angles (deg), the torques with three springs, and the extremes of the torque with 1e6 dyn/cm.
+
+    The extremes are the crank angles (deg) at which this torque is greatest and least.
+    """
     angle, torque = _steady(1e6).angle_deg, np.array([_steady(k).torque for k in STIFFNESSES])
     return angle, torque, {"greatest": greatest(angle, torque[1])[0], "least": least(angle, torque[1])[0]}
 

@@ -399,7 +399,10 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def flattening_damper(inertia_ratio: float, times: float) -> float:
-    """Find the omega_c (1/s) with which the first harmonic at its peak is ``times`` that at a speed higher by `OUTSIDE`."""
+    """Find the damper omega_c (1/s) that limits the peak of the first harmonic.
+
+    The peak is then ``times`` the amplitude of this harmonic at a speed higher by `OUTSIDE`.
+    """
 
     def excess(omega_c: float) -> float:
         at, height = peak(1, inertia_ratio, omega_c)
@@ -534,7 +537,10 @@ def _dampers() -> tuple[Statement, ...]:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """Draw the first harmonic: with each damper by the correct equation, with the strongest also by variants and plant."""
+    """Draw the first harmonic with each damper by the correct equation.
+
+    With the strongest damper also draw it by the variants of the equation and by the plant.
+    """
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; corrected [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

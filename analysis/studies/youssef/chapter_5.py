@@ -236,7 +236,7 @@ def change_by_force(with_force: SliderEquation) -> float:
 def shift_by_motion(ratio: float) -> float:
     """Return the shift of the first region's boundaries by the motion that the force causes, relative to the region's width.
 
-    It is the greater distance of a boundary by the right linear equation from that of the true periodic motion.
+    It is the greater distance of a boundary by the right linear equation from the same boundary of the true periodic motion.
     """
     linear, true = (method(chapter_4(ratio)) for method in (hill_region, orbit_region))
     return max(abs(linear.low - true.low), abs(linear.high - true.high)) / true.width

@@ -317,8 +317,8 @@ TABLE = {
 def path_columns(name: str) -> dict[str, FloatArray]:
     """Return columns by name (cm): the target, and curves of the printed linkage and of ours.
 
-    For each linkage these are the coupler curve, the links, the ground link and the distances from the target; the place on
-    the target is in degrees.
+    For each linkage these are the coupler curve, the links, the ground link and the distances from the target. The
+    place on the target is an angle that grows evenly from 0, with 360 deg for the whole target.
     """
     p = PROBLEMS[name]
     stations = normal_form(p.task).places

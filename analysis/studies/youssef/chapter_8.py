@@ -236,7 +236,7 @@ def _amplitude_a() -> Statement:
 
 
 def _rounded(what: str, speeds: NDArray[np.float64]) -> str:
-    """Name a speed (rpm) with its range over the rounding of the printed stiffness."""
+    """Return the name ``what`` of a speed, with the range of ``speeds`` (rpm) over the rounding of the printed stiffness."""
     return f"{what}; rounded {speeds.min():.0f} to {speeds.max():.0f}"
 
 

@@ -96,7 +96,10 @@ def removing_damping_ratio(mechanisms: Iterable[FiveBarParameters]) -> float:
 
 
 def second_region_width(inertia_ratio: float) -> float:
-    """Return the width in lambda_k^2 of the region of instability at the natural frequency, relative to that at twice it."""
+    """Return the width in lambda_k^2 of the second region of instability, relative to the width of the first.
+
+    The first region is at twice the natural frequency, the second at the natural frequency.
+    """
     parameters = chapter_4(inertia_ratio)
     return width(parameters, 2) / width(parameters)
 
@@ -113,7 +116,7 @@ def judge_single_region() -> tuple[Case, Case]:
 def twice_natural() -> float:
     """Return the speed in the middle of the first region divided by the natural frequency.
 
-    The inertia ratio, of those in `RATIOS`, is the one with the result farthest from 2.
+    Of the results for the inertia ratios `RATIOS`, the one farthest from 2 is returned.
     """
     found = [axis(hill_region(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))

@@ -19,10 +19,10 @@ from .multipliers import judge_multipliers
 from .no_spring import COLLINEAR_SINE, DAMPINGS, DRIFT_TURNS, FEWEST_TURNS, NEAR_LINEAR, TRANSIENT_TURNS, drift
 from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 
-#: Launches of Fig 3.6 and 3.9: torque (dyn.cm) and spring (dyn/cm); those that get collinear without a damper.
+#: Launches of Fig 3.6 and 3.9: torque (dyn.cm) and spring (dyn/cm); launches whose links become collinear without a damper.
 LAUNCHES = (*((torque, 1e6) for torque in TORQUES), (1e8, 5e5), (1e8, 2e6))
 FOLDING = ((2e8, 1e6), (1e8, 5e5))
-#: The damper of a launch (dyn.s/cm), and how long its free motion is followed (s): ten turns of the slowest.
+#: The damper of a launch (dyn.s/cm), and how long its free motion is followed (s): ten turns of the slowest launch.
 DAMPED, FREE = 3e4, 3.0
 
 
@@ -153,8 +153,8 @@ def judge_constant_speed() -> tuple[Statement, ...]:
 def springs_on_torque() -> tuple[float, float]:
     """Compare the steady torques with the softest and the stiffest spring, at 420 rpm.
 
-    The first result is the greatest distance between the curves on a graph, relative to its size. The second is the greatest
-    difference at the same crank angle, relative to the greatest torque with the softest.
+    The first result is the greatest distance between the curves on a graph, relative to the graph's size. The second is the
+    greatest difference at the same crank angle, relative to the greatest torque with the softest spring.
     """
     soft, stiff = (steady_turn(table_3_1(k), SPEED) for k in (STIFFNESSES[0], STIFFNESSES[-1]))
     torques = np.array([soft.torque, stiff.torque])

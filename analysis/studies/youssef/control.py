@@ -159,10 +159,10 @@ def search_on_machine() -> tuple[float, float]:
 
 @cache
 def with_second_crank(name: str) -> Linkage:
-    """Return the printed links of a problem with the rocker pivot on a second crank, geared to the first, of least error.
+    """Return the best linkage that has the printed links of a problem and the rocker pivot on a second, geared crank.
 
-    The second crank turns about the printed place of the pivot. Its ratio is one of `GEARS`; its length and its phase are found
-    by downhill simplexes.
+    The second crank turns about the printed place of the pivot. Its gear ratio is one of `GEARS`; its length and its phase are
+    found by downhill simplexes.
     """
     printed = PROBLEMS[name].linkage
 

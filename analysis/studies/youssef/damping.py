@@ -1,6 +1,6 @@
-"""Figure 5.4: the first region of instability with a damper, and the thesis's ways to find regions with one.
+"""Figure 5.4: the first region of instability with a damper, and the thesis's ways to find regions with a damper.
 
-A damper is omega_c = mu/(m4 + m5) (1/s).
+A damper is given by omega_c = mu/(m4 + m5) (1/s).
 """
 
 from __future__ import annotations

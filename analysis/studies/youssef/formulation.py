@@ -94,7 +94,7 @@ def integrate_both(step: float) -> Integrated:
 
 
 def bar_torque(crank: float, power: int = 1) -> float:
-    """Return the torque (N.m) of a launch at a crank angle (rad): with the power 1 that of 3.2.2, with 5 it ends smoothly."""
+    """Return the torque (N.m) of a launch at a crank angle (rad): that of 3.2.2 for the power 1; for 5 it ends smoothly."""
     return float(TORQUE * max(1.0 - crank, 0.0) ** power)
 
 

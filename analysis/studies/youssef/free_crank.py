@@ -150,7 +150,10 @@ def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
 
 
 def second_halves(runs: Sequence[Trajectory], start: float) -> list[NDArray[np.float64]]:
-    """Return the mean speeds of the turns in the second half of each run (the same turns), relative to its first turn."""
+    """Return the mean speeds of the later turns of each run, relative to the mean speed of its first turn.
+
+    The later turns are the second half of the turns that all runs have.
+    """
     speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]

@@ -41,7 +41,7 @@ def pulse_speeds(speed: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pulse_error(speed: NDArray[np.float64]) -> float:
-    """Return the greatest difference of the speeds by the pulses from the speed midway between the holes, relative to it."""
+    """Return the greatest relative error of the speeds by the pulses, compared with the speed midway between the holes."""
     between = np.interp(np.arange(HOLES) + 0.5, np.linspace(0.0, HOLES, len(speed)), speed)
     return float(np.abs(pulse_speeds(speed) / between - 1.0).max())
 

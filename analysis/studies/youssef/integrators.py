@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 
 from ...run import Hamming
 
-#: Stages of the classical method: place in the step, and weight in sixths. `SLIP` has a slip: its last stage is at mid-step.
+#: Stages of the classical method: time as a fraction of the step, and weight in sixths. `SLIP` has a slip: its last
+#: stage is at mid-step.
 CLASSICAL = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 SLIP = (*CLASSICAL[:3], (0.5, 1.0))
 
@@ -27,7 +28,7 @@ def runge_kutta(
 ) -> NDArray[Any]:
     """Integrate y' = f(t, y) from t = 0 by n steps of length h of the classical Runge-Kutta method; return all states.
 
-    ``stages`` gives for each stage its place in the step and its weight in sixths.
+    ``stages`` gives for each stage its time as a fraction of the step, and its weight in sixths.
     """
     states = [np.asarray(y)]
     for i in range(n):
@@ -42,9 +43,9 @@ def runge_kutta(
 
 @cache
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
-    """Return the greatest stable steps for y' = ``rate`` y (of y'' = -y where it is 1j) by Runge-Kutta's and Hamming's method.
+    """Return the greatest stable steps for y' = ``rate`` y by Runge-Kutta's and by Hamming's method.
 
-    A step is stable if the solution does not grow at the end of ``steps`` steps.
+    The rate 1j stands for y'' = -y. A step is stable if the solution does not grow at the end of ``steps`` steps.
     """
 
     def classical(h: float) -> NDArray[np.complex128]:

@@ -42,15 +42,14 @@ TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Speeds (rpm), by spring (dyn/cm), at which a steadily running crank is released for comparison: above those of the launches.
 RELEASED = {5e5: 580.0, 1e6: 820.0, 2e6: 840.0}
-#: Other such speeds with k = 1e6 dyn/cm: after the strongest launch the time depends on the transient of the released crank.
+#: Other such speeds with k = 1e6 dyn/cm; after the strongest launch the time to the steady decay depends on this choice.
 OTHER_RELEASES = (780.0, 800.0)
 #: Quantity of a plot: its name on the axis, output, factor to its unit, unit.
 Quantity = tuple[str, str, float, str]
 SLIDER: Quantity = ("slider position u", "slider.position", CM_PER_METRE, "cm")
 CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
 TIME = "time [s]"
-#: Our choices in the launches.
-#: Which turns `damper_cases` compares after a launch.
+#: Turns that `damper_cases` compares after a launch, in words; our choices in the launches.
 FROM_RELEASE = (
     "in 3 s (our choice) or until the links become collinear. The turns are counted from 1 rad, where the torque ends"
 )
@@ -98,7 +97,7 @@ def least_torque() -> float:
 
 
 def last_crossing(values: NDArray[np.float64], level: float) -> float:
-    """Return the place, between samples, after which the values stay below a level: 0 if they always do."""
+    """Return the index, with a fraction, after which the values stay below a level; 0 if they always do."""
     above = np.flatnonzero(values > level)
     if not above.size:
         return 0.0
@@ -127,7 +126,8 @@ class Settling(NamedTuple):
 def settling(torque: float, stiffness: float, rpm: float) -> Settling:
     """Compare the slider position u after a launch with u of a free crank in steady decay, released at a speed (rpm).
 
-    They are compared at equal crank angles, in turns of equal mean speed, or with the fastest turn of the released crank.
+    A turn after the launch is compared, at equal crank angles, with the steady decay at the same mean speed; if it is faster
+    than all turns of the steady decay, with the fastest of them.
     """
     launched, steady = launch(torque, stiffness), coast(stiffness, rpm=rpm)
     (after, turns), (known, waves) = (

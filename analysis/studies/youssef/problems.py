@@ -78,7 +78,7 @@ class PublishedProblem:
 
     @property
     def per_si(self) -> float:
-        """Return the number of this unit in one m2 or rad2; the thesis divides an error by its greatest weight."""
+        """Return how many times ``unit`` is contained in one m2 or rad2; the thesis divides an error by its greatest weight."""
         if not isinstance(self.task, syn.RockerFunction):
             return CM2_PER_M2
         return DEG2_PER_RAD2 / float(np.max(np.asarray(self.task.weights, dtype=float)))

@@ -46,9 +46,9 @@ WIDTH = (
 
 
 def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
-    """Return the ratio of the amplitude to that of a single mass under an unbalance (cm.kg), the farthest from 1.
+    """Return the ratio of the amplitude to the amplitude of a single mass under an unbalance (cm.kg).
 
-    The speeds are in rpm. The single mass is on the same spring and damper.
+    The single mass is on the same spring and damper. Of the ratios at the speeds (rpm) the one farthest from 1 is returned.
     """
     rates = RAD_S_PER_RPM * speeds
     amplitudes = np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()])
@@ -178,7 +178,7 @@ def _like_one_mass(
 def linear_motion(
     spring: str, speed: float, variant: Variant = Variant.SECOND_ORDER, harmonics: int = 2
 ) -> HarmonicMotion:
-    """Return the motion u/l4 at a speed (rpm) by the corrected linear equation of chapter IV, with ``harmonics``."""
+    """Return the motion u/l4 at a speed (rpm) by the corrected linear equation of chapter IV, up to harmonic ``harmonics``."""
     return harmonic_balance(slider_equation(rigs.rig(spring), speed * RAD_S_PER_RPM, variant=variant), harmonics)
 
 
