@@ -221,7 +221,7 @@ def judge_convergence() -> tuple[Statement, ...]:
             ),
             "out of the plane the result depends on the accuracy, which the thesis does not give. With a twist the planar "
             "estimate of eta2 is too far off. At a4 = 10 in, S1 = 3.5 in rounding errors decide a few of the counts, which "
-            "changes the shares by about a hundredth",
+            "changes the share to 0.001 by about a hundredth",
         ),
         Statement(
             "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
