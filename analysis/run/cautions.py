@@ -76,7 +76,7 @@ def _twists(mechanism: Mechanism) -> dict[str, int]:
     return {v.of: names.index(v.name) for v in mechanism.variables if v.role == "twist"}
 
 
-def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
+def _slipped_springs(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
     """Return a caution that names springs whose torque jumps as their twist passes half a turn; else an empty text.
 
     ``values`` are the outputs at the samples, shape (n, outputs), and ``time`` the times of the samples (s).
@@ -89,7 +89,7 @@ def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.f
     return f"the torque of {' and '.join(found)} {SLIPPED}" if found else ""
 
 
-def undefined_outputs(names: Sequence[str], time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
+def _undefined_outputs(names: Sequence[str], time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
     """Return a caution that names the outputs that are not finite at a sample; else an empty text.
 
     ``values`` are the outputs ``names`` at the samples, shape (n, outputs), and ``time`` the times of the samples (s).
@@ -112,7 +112,7 @@ def _energies(names: tuple[str, ...]) -> NDArray[np.int64]:
     return np.array([first, *(n for n, name in enumerate(names) if name.startswith("energy.") and n != first)])
 
 
-def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance: float) -> str:
+def _energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance: float) -> str:
     """Return a caution if the residual of the energy balance is larger than the tolerance promises; else an empty text.
 
     ``values`` are the outputs ``names`` at the samples, shape (n, outputs).
@@ -129,3 +129,18 @@ def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance:
         f"the residual of the energy balance is {residual:.3g} J at a greatest energy of {size:.3g} J, more than the tolerance "
         f"{tolerance:g} promises (masses of very different sizes?): take a smaller tolerance"
     )
+
+
+def output_cautions(
+    mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.float64], tolerance: float | None
+) -> str:
+    """Return the cautions about the outputs of a run, as one text; an empty text if there is none.
+
+    ``values`` are the outputs at the samples, shape (n, outputs), ``time`` the times of the samples (s). Whether outputs are
+    finite and energies are balanced is judged by the ``tolerance`` of the run; it is None if the run ended early, or is that of
+    an FMU, and both are then not judged.
+    """
+    doubt, names = "", mechanism.output_names
+    if tolerance is not None:
+        doubt = _undefined_outputs(names, time, values) or _energy_balance(names, values, tolerance)
+    return "; ".join(filter(None, (doubt, _slipped_springs(mechanism, time, values))))

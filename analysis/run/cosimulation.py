@@ -22,7 +22,7 @@ from ..units import Amount, in_si
 from .angles import coordinate_outputs
 from .arguments import complete_initial_state, complete_inputs, require_kind, takes_published, usual_times
 from .case_files import Case
-from .cautions import twists
+from .cautions import output_cautions
 from .events import RunInterrupted, show_progress
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs
@@ -124,7 +124,7 @@ def cosimulate(
         time=time,
         values=values,
         status=march.status,
-        message="; ".join(filter(None, (march.message, twists(prepared.mechanism, time, values)))),
+        message="; ".join(filter(None, (march.message, output_cautions(prepared.mechanism, time, values, None)))),
         names=prepared.mechanism.output_names,
         source=Path(fmu).name + march.title,
         parameters=prepared.parameters,

@@ -15,7 +15,7 @@ from linkwork.integrate import UNDEFINED
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
-from .cautions import energy_balance, twists, undefined_outputs
+from .cautions import output_cautions
 from .events import Event, RunInterrupted, show_progress
 from .locating import SAME
 from .prepared import Run, verdict
@@ -51,9 +51,8 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
         message += f": {run.describe_failed_step(march.good[1])}"
     table = np.array(values).reshape(-1, len(names))
     time = np.array([t for t, _, _ in rows])
-    if not code:
-        message = undefined_outputs(names, time, table) or energy_balance(names, table, run.settings.tolerance)
-    message = "; ".join(filter(None, (message, twists(run.mechanism, time, table))))
+    caution = output_cautions(run.mechanism, time, table, None if code else run.settings.tolerance)
+    message = "; ".join(filter(None, (message, caution)))
     trajectory = Trajectory(
         time=time,
         values=table,

@@ -20,7 +20,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import record_interrupts
 from .angles import WholeTurns
-from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness, twists, undefined_outputs
+from .cautions import MANY_STEPS, disturbance_rates, is_too_slow, output_cautions, stiffness
 from .equations import OUTPUTS, compile_outputs, machine
 from .events import Event, RunInterrupted, show_progress
 from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode_once
@@ -236,10 +236,8 @@ class Run:
         if status[0] == k.NO_STEP:
             message += f": {self.describe_failed_step(x)}"
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
-        names, doubt = self.mechanism.output_names, ""
-        if not code:
-            doubt = undefined_outputs(names, times, values) or energy_balance(names, values, self.settings.tolerance)
-        message = "; ".join(filter(None, (message, stiff, doubt, twists(self.mechanism, times, values))))
+        caution = output_cautions(self.mechanism, times, values, None if code else self.settings.tolerance)
+        message = "; ".join(filter(None, (message, stiff, caution)))
         trajectory = Trajectory(
             time=times,
             values=values,
@@ -251,7 +249,7 @@ class Run:
             ),
             source="compiled DOP853" + balanced * ", energy balanced",
             parameters=self.parameters,
-            names=names,
+            names=self.mechanism.output_names,
             statistics={
                 "steps": float(last["steps"] - last["rejected"]),
                 "rejected": float(last["rejected"]),
