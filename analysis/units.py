@@ -91,8 +91,8 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     ------
     ParameterError
         If the value is neither a number nor a text, its unit is missing or has another dimension, or the number is not finite.
-        Hertz is refused for an angular speed, as a cycle is not a radian, and a number of four turns or more for an angle,
-        unless ``bare`` says its unit: it was probably meant in degrees.
+        Hertz is refused for an angular speed, as a cycle is not a radian. A number of four turns or more is refused for an
+        angle, unless ``bare`` gives its unit: it was probably meant in degrees.
     """
     spelled = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"

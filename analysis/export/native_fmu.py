@@ -266,7 +266,7 @@ def compile_library(
 
 
 def _fingerprint(folder: Path, files: Sequence[str], library: str, target: str, options: Sequence[str]) -> str:
-    """Return a hash of all that a library depends on: the compiler, how this module calls it, and what it may read."""
+    """Return a hash of all that a library depends on: the compiler, its call by this module, and the files that it may read."""
     headers = [Path(after) for before, after in pairwise(options) if before == "-I"]
     plain = [option for option in options if Path(option) not in headers]
     sources = [path for place in (folder, *headers) for path in sorted(place.rglob("*.[ch]"))]

@@ -223,7 +223,7 @@ SOURCE = "sources/guard.c"
 #: Name of PythonFMU's library by the folder of its platform.
 PYTHONFMU = {"linux64": "libpythonfmu-export.so", "win64": "pythonfmu-export.dll"}
 
-#: Options in addition to `CODE`. On Windows the guard calls only the system: the C library takes a minute to compile.
+#: Options in addition to `CODE`. On Windows the guard calls only the system, as the C library takes a minute to compile.
 _OPTIONS = {
     "linux64": ("-Os", "-ldl"),
     "win64": ("-Os", "-ffreestanding", "-nostdlib", "-lkernel32", "-Wl,--entry,DllMain"),

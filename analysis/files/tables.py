@@ -26,7 +26,7 @@ from .reader import unknown_name
 
 #: Count of numbers that are written in one block; Ctrl-C takes effect between blocks.
 _BLOCK = 50_000
-#: A file of this size (bytes) or more is announced, and its progress is shown on a terminal.
+#: Least size (bytes) of a file that is announced, with its progress shown on a terminal.
 LARGE = 20_000_000
 
 

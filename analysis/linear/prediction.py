@@ -18,7 +18,7 @@ from .periodic import PeriodicModel
 
 #: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
 FINE_STEP = 0.03
-#: Greatest rate and acceleration, relative to the mechanism's scales and stiffness, of the state of a model for `predict_loop`.
+#: Greatest rate and acceleration, relative to the mechanism's scales and stiffness, at which a model's state counts as at rest.
 AT_REST = 1e-6
 
 

@@ -114,7 +114,7 @@ def _merge_tables(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bo
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
-    """Return the package of the linkage in the tables of a file; by default it has the title of the file."""
+    """Return the package of the linkage in the tables of a file; if it has no title, it gets that of the file."""
     title = {"title": tables["title"]} if "title" in tables else {}
     return Package(read_description({**title, **tables[LINKAGE]}))
 

@@ -236,7 +236,7 @@ class PointLoad:
     Attributes
     ----------
     point : str
-        Name of the point, on a moving body; where several bodies are pinned the force acts on the first.
+        Name of the point, on a moving body; if several bodies are pinned there, the force acts on the first.
     frame : str
         Axes of the components: ``ground``, or ``body`` for the axes of the body on which the force acts.
     """

@@ -11,7 +11,7 @@ from .writing import function, quote
 
 
 class PicturePoint(NamedTuple):
-    """A point of the picture: its name, its label, the expression of its position, and whether it only places parts."""
+    """A point of the picture: its name, its label, the expression of its position, and whether it only positions parts."""
 
     name: str
     text: str
@@ -103,7 +103,7 @@ class Picture:
     def drag_argument(self, point: PicturePoint) -> str:
         """Return the source of the argument `Joint.moves` of a point: up to two parameters that dragging it changes.
 
-        A point that only places parts cannot be dragged, and has the argument `Joint.aid` instead.
+        A point that only positions parts cannot be dragged, and has the argument `Joint.aid` instead.
         """
         if point.aid:
             return "aid=True"

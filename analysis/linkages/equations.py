@@ -407,7 +407,7 @@ class Twist(NamedTuple):
 def counted_twists(interface: Interface) -> dict[str, Twist]:
     """Return the twist of each torsion spring whose whole turns are counted, by the name of the spring.
 
-    They are counted if the spring acts about the pin of a freedom, or between two bodies whose angles are linear in the
+    Whole turns are counted if the spring acts about the pin of a freedom, or between two bodies whose angles are linear in the
     coordinates: the ground, bodies that freedoms turn, and gears.
     """
     poses = PoseWriter(interface)

@@ -139,7 +139,7 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
 def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
     """Return whether a force law about a pin repeats itself after every whole turn.
 
-    The angle x must stand in sin, cos and tan only, and the law have the same values one turn later.
+    It does if the angle x occurs in sin, cos and tan only, and the law has the same values one turn later.
     """
     if not isinstance(law, str) or _has_plain_angle(ast.parse(law, mode="eval")):
         return False
@@ -155,7 +155,7 @@ def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
 
 
 def _has_plain_angle(node: ast.AST) -> bool:
-    """Return whether x stands outside of sin, cos and tan."""
+    """Return whether x occurs outside of sin, cos and tan."""
     if isinstance(node, ast.Call) and ast.unparse(node.func) in ("sin", "cos", "tan"):
         return False
     return (isinstance(node, ast.Name) and node.id == "x") or any(map(_has_plain_angle, ast.iter_child_nodes(node)))

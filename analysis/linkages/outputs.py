@@ -30,7 +30,7 @@ class Output(NamedTuple):
 
 
 _DEGREES = 'display="deg"'
-#: Arguments of the variable of an angle that leaps from pi to -pi: its bounds say so.
+#: Arguments of the variable of an angle that leaps from pi to -pi: these are its bounds.
 _WRAPPED = f"*POSITION, minimum=-pi, maximum=pi, {_DEGREES}"
 
 

@@ -1,7 +1,8 @@
 """Split a described linkage into freedoms and dyads, pairs of bodies whose poses follow in closed form.
 
-The solution begins at the ground. Each step adds a body whose joint with a known body is a freedom, a gear or rack that
-meshes with a known one, or a dyad: two bodies joined to each other and each to a known body (Assur group of class II).
+The solution begins at the ground. A body is known if its pose is determined. Each step adds a body whose joint with a known
+body is a freedom, a gear or rack that meshes with a known one, or a dyad: two bodies joined to each other and each to a known
+body (Assur group of class II).
 """
 
 from __future__ import annotations

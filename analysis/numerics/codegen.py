@@ -54,7 +54,7 @@ _ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
 
 # Machine code of functions
 
-#: Held while code is compiled, so that threads compile it once and each finds it complete.
+#: Lock that is held while code is compiled, so that threads compile it once and each finds it complete.
 MAKING = RLock()
 _ALIVE: list[Any] = []
 
@@ -338,9 +338,9 @@ _PART: dict[str, Any] = {
 }  # fmt: skip
 #: Decorator of functions that kernels call, and Python cannot call.
 part = njit(**_PART)
-#: The same for functions that make no arrays: counting the references to their arguments would cost more than their work.
+#: As `part`, for functions that make no arrays: counting the references to their arguments would cost more than their work.
 inner = njit(**_PART, _nrt=False)
-#: The same for functions whose value is valid only within their caller: Numba inlines them before it infers types.
+#: As `part`, for functions whose value is valid only within their caller: Numba inlines them before it infers types.
 inline = njit(**_PART, _nrt=False, inline="always")
 
 

@@ -52,7 +52,7 @@ class Evaluation(NamedTuple):
     data: Any
 
 
-#: Computes G(y, lambda) and its derivatives; raises a `LinkworkError` where G is not defined.
+#: Function that computes G(y, lambda) and its derivatives; raises a `LinkworkError` where G is not defined.
 Evaluate = Callable[[Vector, float], Evaluation]
 
 
@@ -445,9 +445,9 @@ class Follower:
         return self._correct(self._scale_point(point) + length * point.tangent, point.tangent, point, aside)
 
     def _interpolate_crossing(self, point: Point, s: float, length: float, bend: Vector) -> _Landing | None:
-        """Return the middle between two points close to each other at which a curve crosses another, None if it is no solution.
+        """Return the point at which a curve crosses another: the middle of two points near it, None if it is no solution.
 
-        Where two curves cross, the corrections have no unique solution.
+        At the crossing itself the corrections have no unique solution.
         """
         before, after = (self._step(point, s + side * _ASIDE * length, bend) for side in (-1.0, 1.0))
         if isinstance(before, _Failure) or isinstance(after, _Failure):

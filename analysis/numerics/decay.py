@@ -6,8 +6,8 @@ A mass m on a spring k with a damper c and dry friction F has its turning points
 
 every half period T/2 = pi / omega_d, where q = exp(-delta / 2) and delta = pi c / (m omega_d) is the logarithmic decrement of
 a whole cycle. Dry friction shortens each swing by the same length, the damper by the same percentage; friction does not change
-the period. It does change the acceleration at a turning point at the distance x from b: this is the acceleration due to the
-spring, times 1 + r / x before the turning point, and times 1 - r / x after it.
+the period. Friction does change the acceleration at a turning point at the distance x from b: it is the acceleration due to
+the spring, times 1 + r / x before the turning point, and times 1 - r / x after it.
 """
 
 from __future__ import annotations

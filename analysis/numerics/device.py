@@ -5,7 +5,7 @@ addresses of arrays, as `pack` writes them; a function of `reader` reads the ker
 
 Numba's code of the kernel, before LLVM optimises it, is linked with the equations, which are written for one lane without
 calls of the C library (`lanes`), since a device has none. LLVM compiles both together. The arithmetic is that of IEEE 754 on
-each device, so the same code compiled for this processor has the same results: the tests do that.
+each device, so the same code compiled for this processor has the same results, which the tests use.
 """
 
 from __future__ import annotations

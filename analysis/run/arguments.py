@@ -20,7 +20,7 @@ from ..units import Amount
 from .inputs import Inputs, parameter_readers, read_start
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-#: Takes a published set and an argument, None if it was not given; returns the value to use for the argument.
+#: Function that takes a published set and an argument (None if not given), and returns the value to use for the argument.
 Fill = Callable[[PublishedSet, Any], Any]
 
 
@@ -156,14 +156,14 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 
 
 def complete_initial_state(known: PublishedSet, initial: Any) -> Any:
-    """Return the initial state of a run: by default that of the published set, which also completes a mapping."""
+    """Return the initial state of a run: by default that of the published set, which also fills the gaps of a mapping."""
     if isinstance(initial, Mapping):
         return read_start(find_mechanism(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
 def complete_speed(known: PublishedSet, speed: Any) -> Any:
-    """Return the given crank speed, or the speed of the published set (rad/s) if it is None."""
+    """Return the given crank speed or, if it is None, the speed of the published set (rad/s)."""
     return known.crank_speed if speed is None else speed
 
 

@@ -72,7 +72,7 @@ def read_parameters(
 
 
 def parameter_tables(parameters: Parameters) -> dict[str, Any]:
-    """Return parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
+    """Return parameters as nested tables of texts with SI units and all digits; the entry ``mechanism`` has its name."""
     mechanism = find_mechanism(parameters)
     data: dict[str, Any] = {"mechanism": mechanism.name}
     for name, variable in mechanism.mechanism_variables.items():

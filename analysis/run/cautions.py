@@ -19,7 +19,8 @@ MANY_STEPS = 50_000
 _PATIENCE, _SHARE = 1_000_000, 0.1
 #: Least decay rate times step size at which stability limits the step: explicit methods of this order are stable up to about 5.
 _STABLE = 2.0
-#: Least phase angle (rad) of the fastest vibration in a step at which the vibration limits the step: usually about 1.
+#: Least phase angle (rad) of the fastest vibration in a step at which the vibration is taken to limit the step: where it does,
+#: the angle is usually about 1.
 _FOLLOWED = 0.3
 #: Largest residual of the energy balance without a caution: the first number times tolerance times greatest energy, but at most
 #: the second times greatest energy. For comparison with the first number: a usual run has 2, a run of 2000 revolutions 12.

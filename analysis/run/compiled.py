@@ -54,7 +54,8 @@ from .stepping import (
     step_short_of_limit,
 )
 
-#: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
+#: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected. A
+#: larger one is left as it is: near rest the kinetic energy is small.
 GREATEST_SHARE = 1e-3
 
 
@@ -237,7 +238,7 @@ def short_step_status(h, motion):
 
 @inner
 def _sample_beginning(motion):
-    """Record the samples at the beginning of the interval, with the inputs that begin here."""
+    """Record the samples at the beginning of the interval, with the inputs of this interval."""
     carry, samples = motion.carry, motion.samples
     while carry.sample < samples.times.shape[0] and samples.times[carry.sample] <= carry.begin:
         copy(motion.x, samples.states[carry.sample])

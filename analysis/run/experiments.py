@@ -255,7 +255,7 @@ class _Reader:
 
 
 def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome]:
-    """Run the experiments that an FMU from any tool contains, with FMPy, and compare them with its reference results.
+    """Run the experiments that an FMU from any tool contains, with FMPy, and compare results with references.
 
     An experiment is run in co-simulation if the FMU has that interface: inputs are held over each step, and the reference has
     the outputs at the end of the step, before the next inputs are set. Differences are relative to the scale of a variable.

@@ -34,7 +34,7 @@ class CosimulationError(LinkworkError):
 
 
 def _description(fmu: str | Path) -> Any:
-    """Read and validate the model description of an FMU; CosimulationError if there is no such FMU."""
+    """Read and validate the model description of an FMU; raise CosimulationError if the file is none."""
     if not Path(fmu).is_file():
         raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
     try:
@@ -326,7 +326,7 @@ class Messages(list[str]):
     """The log messages of one instance of an FMU, in the order in which they came."""
 
     def receive(self, *arguments: Any) -> None:
-        """Append a message to the list; it is the last argument in FMI 2.0 and in FMI 3.0."""
+        """Append a message to the list: the last of the ``arguments``, in FMI 2.0 and in FMI 3.0."""
         self.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def callbacks(self) -> Any:

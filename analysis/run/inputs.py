@@ -27,7 +27,7 @@ from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, Sta
 
 #: Types that count as numbers.
 NUMBER = (int, float, np.floating, np.integer)
-#: Largest numerator and denominator of a ratio of crank speeds: beyond it the cranks count as without a common period.
+#: Largest numerator and denominator of a ratio of crank speeds: if it needs larger ones, the cranks have no common period.
 MOST_TURNS = 100
 #: Largest numerator and denominator of a ratio of speeds at the start that is not rounded: see `start_ratio`.
 _MOST_AT_START = 6

@@ -93,7 +93,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
 
 
 def _section_entries(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of a link's section from ``flat``, a file's values by dotted name; empty without a section."""
+    """Return the entries of a link's section from ``flat``, a file's values by dotted name; empty if it has no section."""
     head = f"{link.name}.section"
     if head in flat:
         raise ParameterError(head, flat[head], f"be a table with a kind, of {', '.join(SECTIONS)}")

@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 #: The two components of the force at P (N): constant, or a function of the crank angle (rad).
 Load = tuple[float, float] | Callable[[float], tuple[float, float]]
 
-#: Names of the outputs of a prescribed motion: all except the energies, which are counted from the start of a run.
+#: Outputs that a prescribed motion does not have, as these energies are counted from the start of a run; and those that it has.
 _LEFT_OUT = ("energy.dissipated", "energy.supplied", "energy.residual")
 NAMES = tuple(name for name in FIVE_BAR.output_names if name not in _LEFT_OUT)
 _KEPT = [FIVE_BAR.output_names.index(name) for name in NAMES]

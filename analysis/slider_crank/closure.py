@@ -334,7 +334,7 @@ def _check(found: Closure) -> None:
 
 
 def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArray:
-    """Return the distance of the crank pin from the guide minus the rod length (m): the loop cannot be closed if positive."""
+    """Return the distance of the crank pin from the guide minus the rod length (m); if positive, the loop cannot close."""
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]

@@ -306,7 +306,7 @@ def _wrap_angle(angle: float, law: PeriodicShift) -> float:
 
 
 def _assembly_square(angle: float, law: PeriodicShift, p: Constants) -> float:
-    """Return the square of the rod less that of the distance from crank pin to guide (m2): zero if they differ by rounding."""
+    """Return squared rod length minus squared distance of crank pin from guide (m2); zero if it is a rounding error."""
     square = kinematics.assembly_square(angle, law.at(angle)[0], p)
     return 0.0 if abs(square) <= _EQUAL * p.a2 * p.a2 else square
 

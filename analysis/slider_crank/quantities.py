@@ -62,7 +62,7 @@ UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 
 
 def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return the units of a system by SI unit: an entry of `UNITS`.
+    """Return the units of the system ``units``, by SI unit: an entry of `UNITS`.
 
     Raises
     ------

@@ -192,8 +192,8 @@ class MonteCarlo:
     def linear_misses(self, quantity: str) -> NDArray[np.bool_]:
         """Return a mask (n,) of the angles at which the linear estimate fails.
 
-        The estimate fails if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five
-        standard errors, of the estimate or the samples, whichever is greater, or if a dead centre is so near that there is no
+        The estimate fails if its mean or standard deviation differs from that of the samples by more than 5 % of the standard
+        deviation (the greater one of the two) plus five standard errors, or if a dead centre is so near that there is no
         estimate.
         """
         check_names((quantity,), self.spreads, "quantity")

@@ -192,7 +192,7 @@ class TimeShift:
 
 
 def groove_motion(f: ReboundFunctions, p: Any, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-    """Return the shift by the groove with ``amplitude`` and ``ratio`` of ``p``, and its rates; ``f`` are the equations."""
+    """Return shift and rates by the groove with ``amplitude`` and ``ratio`` of ``p``; ``f`` are the plant's equations."""
     shift, pitch, bend = f.groove(angle, p)
     return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
@@ -289,7 +289,7 @@ class Course:
         return ShiftMotion(*(np.broadcast_to(x, angle.shape) for x in moving))
 
     def _assembly_square(self, angle: FloatArray) -> FloatArray:
-        """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""
+        """Return squared rod length minus squared distance of pin from guide (m2); positive if the rod reaches the guide."""
         return np.asarray(
             plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
         )

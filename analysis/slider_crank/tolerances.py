@@ -187,7 +187,7 @@ class PerturbedTurn:
 
     @property
     def assembly_square(self) -> Any:
-        """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""
+        """Return squared rod length minus squared distance of pin from guide (m2); positive if the rod reaches the guide."""
         return self.functions.assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:

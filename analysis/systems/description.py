@@ -92,7 +92,7 @@ class System:
     title : str
     parts : mapping of str to PartTable
     connections : mapping of End to End
-        The output that each input is connected to.
+        For each connected input, the output to which it is connected.
     run : RunTable
     folder : path
         Folder to which file names are relative.
@@ -144,7 +144,7 @@ class System:
     def _inputs(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
         """Return the constant inputs of a part's case; refuse an input that varies unless something replaces it.
 
-        A connection or a start value replaces it: of the input itself, or of another input that drives the same freedom.
+        It is replaced by a connection or a start value of the input itself, or of another input that drives the same freedom.
         """
         here = {end.port for end in self.connections if end.part == name} | set(self.parts[name].values)
         driven = {c.freedom for c in mechanism.channels if c.name in here and c.freedom >= 0}

@@ -23,7 +23,7 @@ OPTIONS = (
 def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     """Write a system as C files into a folder, and return the names of the files to compile.
 
-    Compile ``host.c``, which is the master with its clock, and one file for each native FMU. The header ``system.h`` has the
+    These are ``host.c``, which is the master with its clock, and one file for each native FMU. The header ``system.h`` has the
     start values and the connections.
 
     Raises

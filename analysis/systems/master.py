@@ -108,7 +108,7 @@ class SystemRun:
     def suggested_step(self, share: float) -> float | None:
         """Return the communication step with which the coupling would add a given share of the work (s).
 
-        It is valid if the steps of the run are equal, and so small that a residual is proportional to the step, or to the
+        The step is valid if the steps of the run are equal, and so small that a residual is proportional to the step, or to the
         square of the step if the inputs are linear in time. The result is None if the coupling added no work, as without power
         bonds, and for couplings whose error the residuals do not measure.
         """
@@ -269,7 +269,7 @@ class _Instances:
 
 
 def count_steps(stop_time: float, step: float) -> int:
-    """Return the number of equal steps in a run, of which the last may be shorter; refuse a step that no run can have."""
+    """Return the number of equal steps in a run, of which the last may be shorter; raise InputError if the step is invalid."""
     if not 0.0 < step <= stop_time < inf:
         raise InputError(
             f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s, which must be "
@@ -279,7 +279,7 @@ def count_steps(stop_time: float, step: float) -> int:
 
 
 class _Stepper:
-    """Controller of the communication step: constant, or adapted so that the coupling adds a wanted share of the work."""
+    """Controller that keeps the communication step constant, or adapts it so that the coupling adds a wanted share of work."""
 
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share

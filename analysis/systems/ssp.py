@@ -23,7 +23,7 @@ common = lazy("pyssp_standard.common_content_ssc")
 unit = lazy("pyssp_standard.unit")
 etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
-#: Type of the experiment's annotation with the communication step, for which the standard has no place.
+#: Type of the annotation of an experiment that gives the communication step; the standard has no entry for this step.
 STEP = "linkwork.communication-step"
 
 

@@ -57,7 +57,7 @@ def _below(node: Node, *path: str) -> list[Node]:
 
 
 def _read(archive: zipfile.ZipFile, node: Node, what: str) -> bytes:
-    """Return the file of an archive, or the file inside a component, at which the source of an element points."""
+    """Return the content of the file of an archive that the attribute ``source`` of an element names."""
     source = node.get("source", "")
     try:
         return archive.read(posixpath.normpath(unquote(source)))
@@ -216,7 +216,7 @@ def _links(systems: Mapping[str, Node]) -> Iterator[tuple[End, End]]:
 
 
 def _reach(links: Sequence[tuple[End, End]], start: End, systems: Container[str]) -> list[End]:
-    """Return the ends at parts that are connected to an end, directly or through edges of systems."""
+    """Return the ends at parts that are connected to the end ``start``, directly or through edges of systems."""
     seen, found = [start], []
     for end in seen:
         for other in (pair[not n] for pair in links for n in (0, 1) if pair[n] == end):

@@ -193,7 +193,7 @@ class Wiring:
     title : str
     parts : mapping of str to Part
     connections : mapping of End to End
-        The output that each input is connected to.
+        For each connected input, the output to which it is connected.
     stop_time, step : float
         End of a run, and default communication step (s).
     remarks : tuple of str

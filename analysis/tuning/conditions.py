@@ -138,7 +138,7 @@ class CrossPlane:
 
     @classmethod
     def level_plane(cls, wish: Wish, spot: Spot, level: float) -> CrossPlane:
-        """Return the plane of a fixed level, for motions with as many components of y as the spot."""
+        """Return the plane on which the level is ``level``, for motions with as many components of y as the spot."""
         return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
@@ -309,7 +309,8 @@ def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the value that the limit bounds, over a period, and the crank angles at which it occurs.
 
-    The value is the greatest magnitude of the limited quantity, with one angle; or its amplitude, with those of both extremes.
+    The value is the greatest magnitude of the limited quantity, with one angle; or its amplitude, with the angles of both
+    extremes.
     """
     samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]

@@ -334,7 +334,7 @@ def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
-    """Return whether the changes x meet all requirements, and their survey; None if the motions cannot be followed."""
+    """Return whether the changes x meet all requirements, and their survey, None if the motions cannot be followed."""
     several: tuple[float, ...] = ()
     try:
         found = search.survey_changes(x)

@@ -54,7 +54,7 @@ from .wishes import Limit, Wish
 STEP, BESIDE = 2e-2, 0.4
 #: How far a branch that the response does not meet is followed beyond each end of the range, relative to its width.
 FAR = 4.0
-#: Greatest number of least values of a test function along a branch, and of greatest values of an output, that are refined.
+#: Greatest number of minima of a test function along a branch, and greatest number of maxima of an output, that are refined.
 _LEAST, _MOST = 3, 4
 #: Value of a test function above which no multiplier is near to the circle.
 _NEAR = 0.5
