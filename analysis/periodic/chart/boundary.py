@@ -148,8 +148,8 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     return evaluation
 
 
-#: Points of a line at which all motions are sought; greatest number of points of a branch in each direction; greatest step of
-#: a branch, relative to the range of its parameter.
+#: Number of points of a line at which all motions are sought; greatest number of points of a branch in each direction; greatest
+#: step of a branch, relative to the range of its parameter.
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
@@ -222,7 +222,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     start : array_like, shape (n,), optional
         Guess of the first orbit: see `find_orbit`.
     near : Grid, optional
-        A grid over the same plane.
+        A grid over the same plane, whose orbits are further guesses.
     """
     first = None if start is None else np.array(start, dtype=float)
     last = first

@@ -592,7 +592,8 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
 def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Return whether an orbit continues the motion that a grid found around ``place``.
 
-    It does if its start is near the start of the grid's orbit at one of the grid points around ``place``.
+    The orbit continues this motion if its start is near the start of the grid's orbit at one of the grid points around
+    ``place``.
     """
     scale = orbit.scale * motion_sizes(orbit, orbit.amplitudes)
     distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)

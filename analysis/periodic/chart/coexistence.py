@@ -33,9 +33,9 @@ from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions, Points
 FloatArray = NDArray[np.float64]
 #: Number of guesses from which the motions of a point are sought, after the motions of its neighbour: a power of two.
 STARTS = 16
-#: Rows of a grid whose motions are sought at once, so that all lanes have work while the last search of a point ends.
+#: Number of rows of a grid whose motions are sought at once, so that all lanes have work while the last search of a point ends.
 _TOGETHER = 4
-#: Samples of a turn from which an amplitude is computed.
+#: Number of samples of a turn from which an amplitude is computed.
 SAMPLES = 64
 #: For basins: distance from a motion below which the mechanism has settled on this motion, relative to the scale, and the same
 #: relative to the distance of the nearest other motion; bound of the integrator's local error, relative to the least of these
@@ -291,7 +291,7 @@ class Basins(NotebookResult):
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
         Initial values of a free coordinate (m for a slider) and of its rate (m/s); the other components of the initial state y
-        are those of the first motion, see ``fixed``.
+        have the values of the first motion, see ``fixed``.
     ends : ndarray of int, shape (ny, nx)
         Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the mechanism settles on
         no motion within the computed number of turns.
@@ -338,7 +338,7 @@ class Basins(NotebookResult):
 
     @property
     def fixed(self) -> tuple[str, ...]:
-        """FMI names of the coordinates and rates that are the same at all starts, those of the first motion.
+        """FMI names of the coordinates and rates that are the same at all starts: they are taken from the first motion.
 
         A motion that differs from the first motion only in these components may not be reached: a pendulum exactly at rest
         begins to swing only because of rounding errors.
@@ -384,8 +384,9 @@ def basins(
     points : int
         Number of initial states along each axis.
     coordinate : str, optional
-        FMI name of the free coordinate that varies with its rate, such as "swing.angle"; all other components of y are those of
-        the first motion. By default the coordinate in which the stable motions differ most; if a range is given, the first.
+        FMI name of the free coordinate that varies with its rate, such as "swing.angle"; all other components of y have the
+        values of the first motion. By default the coordinate in which the stable motions differ most; if a range is given, the
+        first.
     position, rate : (float, float), optional
         Ranges of the coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default one and a half
         times the range in which the motions found move, as far as the links can be joined.
@@ -465,8 +466,8 @@ def _measures(point: OperatingPoint, found: Orbits) -> FloatArray:
     """Return a matrix for each passage of the stable motions at crank angle 0, shape (k, n, n): see `kernels.settle_starts`.
 
     The distance from a motion is measured by Lyapunov's quadratic form, which falls from period to period. In the direction in
-    which the form is least, the distance equals that in units of the scale of y. The scale alone is no measure: if a free
-    vibration is much slower than the crank, equal deviations of position and of rate, in units of the scale, may cause
+    which the form is least, this distance equals the distance in units of the scale of y. The scale alone is no measure: if a
+    free vibration is much slower than the crank, equal deviations of position and of rate, in units of the scale, may cause
     amplitudes of which one is a hundred times the other.
     """
     passed, measures = [orbit.passages() for orbit in found.orbits], []
@@ -555,8 +556,8 @@ def _ends(
     """Return for each start the index in ``known`` of the motion on which the mechanism settles, or LOST or UNSETTLED.
 
     Each start is the start of the first known motion, but with a value of ``across``, shape (points,), for the coordinate with
-    the index ``place`` in y, and with a value of ``rates`` for its rate, which is the same in a row. ``measures`` are those of
-    `_measures`.
+    the index ``place`` in y, and with a value of ``rates`` for its rate, which is the same in a row. ``measures`` is the result
+    of `_measures`.
     """
     starts = np.tile(known[0], (len(rates) * len(across), 1))
     starts[:, place], starts[:, point.flow.size // 2 + place] = (

@@ -527,7 +527,7 @@ def solve_all(section, points, search, columns, angles, guesses, found):
     found : Motions
         The result; its arrays are written.
 
-    The other parameters are those of `solve_row`.
+    For the other parameters see `solve_row`.
     """
     n = guesses.shape[1]
     seekers = _make_seekers(n, found.counts.shape[0] // columns, max(MOST_ORBITS, guesses.shape[0]))
@@ -544,7 +544,7 @@ LOST, UNSETTLED = -1, -2
 def _find_known(z, known, measures, section, away):
     """Return the index of the known motion on which the state z has settled, or UNSETTLED if there is none.
 
-    Whole turns of angles are ignored. ``measures`` are those of `settle_starts`; ``away`` is work space.
+    Whole turns of angles are ignored. For ``measures`` see `settle_starts`; ``away`` is work space.
     """
     end = UNSETTLED
     for k in range(known.shape[0]):

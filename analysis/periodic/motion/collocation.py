@@ -34,7 +34,7 @@ from ...numerics.vectors import LANES, absolute, greater, load, multiply_add, st
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room, write_mechanism
 
-#: Nodes of an element.
+#: Number of nodes of an element.
 NODES = 12
 #: Nodes C and weights B on an element of length 1; A integrates the Lagrange polynomials up to each node, AA twice, and BA
 #: integrates them twice up to the end.

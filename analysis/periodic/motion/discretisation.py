@@ -161,7 +161,7 @@ class OperatingPoint:
     ) -> Ends:
         """Integrate y with its derivatives over the pieces of a period, each from its own start; raise OrbitError on failure.
 
-        ``angles`` and ``starts`` are those of `Stations`, ``direction`` and ``along`` those of `section`.
+        For ``angles`` and ``starts`` see `Stations`, for ``direction`` and ``along`` see `section`.
         """
         k, n = starts.shape
         rows = np.zeros((k, n * (2 + n)))
@@ -262,7 +262,7 @@ class Stations(NamedTuple):
 def growth_factors(matrices: FloatArray, scale: FloatArray) -> FloatArray:
     """Return the greatest growth factor of a deviation over each piece of a period; shape (k,).
 
-    ``matrices`` are those of `Ends`; deviations are measured in units of ``scale``, the scale of y.
+    For ``matrices`` see `Ends`; deviations are measured in units of ``scale``, the scale of y.
     """
     return np.asarray(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)))
 
@@ -286,7 +286,7 @@ class Discretisation:
     """Method that computes y at the ends of the pieces of a period, for one motion of a family after another.
 
     Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried, as
-    ``collocated`` tells (`can_collocate`). ``angles`` are those of `Stations`.
+    ``collocated`` tells (`can_collocate`). For ``angles`` see `Stations`.
     """
 
     def __init__(self, angles: FloatArray, collocated: bool) -> None:
@@ -305,8 +305,8 @@ class Discretisation:
     ) -> Ends:
         """Compute y and its derivatives at the ends of the pieces from y at their beginnings, ``starts``.
 
-        ``value`` is the value of lambda; ``direction`` and ``along`` are those of `OperatingPoint.section`. Raises OrbitError
-        if the integration over a piece fails.
+        ``value`` is the value of lambda; for ``direction`` and ``along`` see `OperatingPoint.section`. Raises OrbitError if the
+        integration over a piece fails.
         """
         self._pause -= 1
         if self.collocated and self._pause < 0:

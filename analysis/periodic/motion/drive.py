@@ -83,8 +83,8 @@ class Drive:
     speed : float or None
         Prescribed crank speed (rad/s), above zero; None for a drive by torque.
     torque : float
-        Constant torque on the crank (N.m): the mean torque, without that of a motor; given as 0 where a force law of the
-        mechanism drives the crank. It is 0 at a prescribed speed.
+        Constant torque on the crank (N.m), which is the mean torque without the torque of a motor. Give 0 if a force law of the
+        mechanism drives the crank. At a prescribed speed the torque is 0.
     motor : InductionMotor or None
         Motor on the crank; its torque is added to ``torque``.
     forces : mapping of str to float
@@ -587,7 +587,7 @@ SAME = 1e-6
 #: Greatest distance of starts from rest if no limit of assembly is met, relative to the scale of y, and the factor by which
 #: the distance is increased until the limit is met.
 _WIDEST, _WIDER = 16.0, 1.25
-#: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor above.
+#: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor ``_WIDER``.
 _ONE_SIDED = 1.3
 #: Greatest number of free vibrations per turn of the crank at the widest starts, or twice the number at small amplitudes if
 #: that is greater; for a coupled body, also the greatest speed, relative to the crank, that the spring of its coupling gives

@@ -120,7 +120,8 @@ class Flow:
     base : int
         Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
     commons : int
-        Number of common periods of the cranks, and of what springs couple to them, in ``base`` periods of the crank.
+        Number of common periods of the cranks, and of the rotations that springs couple to them, in ``base`` periods of the
+        crank.
 
     Attributes
     ----------
@@ -305,8 +306,8 @@ class Flow:
 
         The arguments are the crank angle; z, which is y and the columns of its derivatives; the modes; the drive vector and its
         derivative with respect to lambda; the constants and their derivative with respect to lambda. ``plain`` gives dy/dangle;
-        ``variational`` gives also the rates of the columns dy/dy0, ``directional`` also those of dy/dlambda. ``gap`` gives the
-        clearance to the limit of assembly, ``state`` the state of a run and the channels.
+        ``variational`` gives also the rates of the columns dy/dy0, ``directional`` also the rates of dy/dlambda. ``gap`` gives
+        the clearance to the limit of assembly, ``state`` the state of a run and the channels.
         """
         casadi = symbolic.library()
         n, m = self.size, self.mechanism

@@ -178,7 +178,7 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
 
     The step ends at ``end`` at the latest. The rates of z are in ``room.k[0]``, and its clearance in ``room.gap``. z after the
     step and its clearance are written into ``room.y`` and ``room.gap``. ``slowest`` is the crank speed below which the crank
-    stalls; ``carry`` is that of `advance`.
+    stalls; for ``carry`` see `advance`.
     """
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
@@ -481,7 +481,7 @@ def continue_deflated_newton(section, most, reach, status, known, z, hunt):
 def newton(section, end, most, start, z, room, carry, report):
     """Solve y(end) = y(0) by Newton's method.
 
-    Parameters and result are those of `solve`; ``room`` and ``carry`` are those of `advance`.
+    For parameters and result see `solve`, for ``room`` and ``carry`` see `advance`.
     """
     hunt = make_hunt(start)
     what = GOING
@@ -527,7 +527,7 @@ def solve(section, end, most, start, z, report):
 def deflated_newton(section, end, most, reach, start, known, z, room, carry):
     """Run Newton's method with the known orbits divided out.
 
-    Parameters and result are those of `search`; ``room`` and ``carry`` are those of `advance`.
+    For parameters and result see `search`, for ``room`` and ``carry`` see `advance`.
     """
     hunt = make_hunt(start)
     what = GOING
@@ -561,7 +561,7 @@ def search(section, end, most, reach, start, known, z):
     z : ndarray, shape (n (1 + n),)
         Work space.
 
-    The other parameters and the result are those of `solve`.
+    For the other parameters and the result see `solve`.
     """
     room = make_room(section, section.scale.shape[0])
     return deflated_newton(section, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))

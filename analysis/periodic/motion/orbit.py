@@ -51,21 +51,22 @@ ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction relative to the scale of y.
 #: A motion that is found is solved again with the full tolerance.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
-#: Pieces of a common period in the search for motions near a uniform rotation.
+#: Number of pieces of a common period in the search for motions near a uniform rotation.
 EVEN_PIECES = 12
-#: Sets of starts if Newton's method fails from the guess, and starts in each set, a power of two: near a resonance with small
-#: damping about one start in forty leads to the motion.
+#: Number of sets of starts if Newton's method fails from the guess, and number of starts in each set, a power of two: near a
+#: resonance with small damping about one start in forty leads to the motion.
 SETS, STARTS = 4, 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
-#: Turns for which a motion is followed if Newton's method fails from the guess, and change per turn below which it is steady.
+#: Greatest number of turns for which a motion is followed if Newton's method fails from the guess, and change per turn below
+#: which it is steady.
 SETTLING_TURNS, SETTLED = 200, 1e-4
-#: Samples of a turn for amplitudes and harmonics.
+#: Number of samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
 #: Greatest number of samples of a turn where a motion is sharp, as at a stop, and size of the highest harmonics,
 #: relative to the greatest harmonic, above which there are more samples.
 _MOST_SAMPLES, _SHARP = 8192, 1e-5
-#: Error of an amplitude, relative to the scale of the coordinate: a little more than that of the orbits.
+#: Error of an amplitude, relative to the scale of the coordinate: a little more than the error of the orbits.
 _ROUNDING = 10.0 * ORBIT_TOLERANCE
 #: Outputs that an orbit does not have: they count from the start of a run.
 OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
@@ -345,7 +346,7 @@ class PeriodicOrbit(NotebookResult):
         return rows
 
     def turn(self, samples: int | None = None) -> Turn:
-        """Return the outputs over one period at equal steps of the crank angle, by default `SAMPLES` for each turn of it."""
+        """Return the outputs over one period at equal steps of the crank angle, by default `SAMPLES` per turn of the crank."""
         flow, mechanism = self.flow, self.point.mechanism
         samples = samples or SAMPLES * self.crank_turns
         angles = np.linspace(0.0, flow.period * self.turns, samples, endpoint=False)

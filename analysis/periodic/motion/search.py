@@ -3,7 +3,7 @@
 Newton's method finds one motion, which depends on the guess. `find_orbits` uses two methods that share only the map over a
 period: many starts that fill the region in which the mechanism can be assembled, some of which are followed for some turns if
 Newton's method fails; and, from fewer starts, deflation, which divides out each motion that was found. If both find the same
-motions, and the sum of their indices is 1, it is unlikely that one was missed.
+motions, and the sum of their indices is 1, it is unlikely that a motion was missed.
 
 `find_orbit` returns the motion that a machine reaches when it is run up slowly from rest; `sweep` steps through speeds as a
 machine does, including jumps between motions.
@@ -570,7 +570,7 @@ class _FoundMotions:
         self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
         self._ranges = ranges
         self.orbits: list[PeriodicOrbit] = []
-        #: Starts of all motions, one for each turn of a motion; motions of shorter periods are included.
+        #: Starts of all motions found, one for each turn of a motion; motions of shorter periods are included.
         self.known = np.empty((0, len(guess)))
         #: See `Orbits`.
         self.index = 0
@@ -625,7 +625,7 @@ class _FoundMotions:
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def intermediate_starts(self) -> list[FloatArray]:
-        """Return starts between every pair of known motions, where a third one often lies, and around each known motion."""
+        """Return starts between every pair of known motions, where a third motion often lies, and around each known motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]

@@ -38,8 +38,8 @@ _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
 _AT_CROSSING = 1e-8
 #: Greatest distance of the first motion of a branch from the point at which it begins, relative to the range and to the scale.
 BEGINNING = 0.05
-#: For each kind of point at which a branch begins: period of its motions relative to that of the point, and distances of its
-#: first motion that are tried, relative to the crank's length.
+#: For each kind of point at which a branch begins: period of the branch's motions relative to the period at the point, and
+#: distances from the point at which the first motion is sought, relative to the crank's length.
 _BEGINNINGS = {
     Crossing.PERIOD_DOUBLING: (2, (2e-3, 8e-3, 5e-4, 3.2e-2)),
     Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),
@@ -306,7 +306,7 @@ def switch(
 def motion_sizes(orbit: PeriodicOrbit, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return for each component of y how large motions are, relative to the scale: thirty times the amplitude, 1 at most.
 
-    Motions may be much smaller than the links that give the scale, which is that of ``orbit``.
+    The scale is the scale of ``orbit``. It follows from the links, and motions may be much smaller than links.
     """
     free = len(orbit.flow.free)
     shares = amplitudes[:free] / orbit.scale[:free]

@@ -310,7 +310,7 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
     Raises
     ------
     UnknownNameError, InputError
-        If a name is not that of a parameter, or the parameter does not act in this drive.
+        If a name is not the name of a parameter, or the parameter has no effect in this drive.
     LinkworkError
         If the variational equations cannot be resolved.
 
@@ -380,7 +380,7 @@ def crossing_gradient(
 ) -> PointGradient:
     """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
-    The arguments are those of `extremum_gradient`, with the ``kind`` of the point.
+    For the arguments see `extremum_gradient`; ``kind`` is the kind of the point.
 
     Raises
     ------
@@ -550,7 +550,7 @@ def singular_matrix(matrix: FloatArray, kind: Crossing, by: FloatArray | None = 
 
 
 def determinant_derivatives(matrix: FloatArray, by: FloatArray) -> FloatArray:
-    """Return the derivatives of the determinant of a matrix, shape (m,), from those of its entries, (n, n, m)."""
+    """Return the derivatives of the determinant of a matrix, shape (m,), from the derivatives of its entries, (n, n, m)."""
     total = np.zeros(by.shape[-1])
     for column in range(len(matrix)):
         # the determinant is linear in each column
@@ -570,7 +570,7 @@ def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     """Return the derivatives of the motion at a fold that moves by ``shift`` along the last parameter; shape (k, s, n, m).
 
     The first-order equations determine the derivatives up to a multiple of the eigenvector. The second-order equations
-    determine this multiple, since the multiplier stays +1. The last column, that of the last parameter, is zero.
+    determine this multiple, since the multiplier stays +1. The last column, for the last parameter, is zero.
     """
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)

@@ -30,7 +30,7 @@ from ..motion.flow import PLAIN, STATE, Flow
 from ..motion.orbit import PeriodicOrbit
 
 FloatArray = NDArray[np.float64]
-#: Gauss points of a panel; panels of a turn at first; halvings of a panel at most.
+#: Number of Gauss points of a panel; number of panels of a turn at first; greatest number of halvings of a panel.
 _POINTS, _PANELS, _HALVINGS = 8, 32, 40
 #: Size of the last Legendre coefficients over a panel above which the panel is halved: for the rates and their derivatives, in
 #: the scale of y; for the effect of a parameter on the rates, relative to its greatest value.

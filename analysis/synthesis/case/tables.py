@@ -334,7 +334,7 @@ class PrecisionPointsTable(_Curve):
     Attributes
     ----------
     length : float
-        Length that converts an error of angle into one of position; half the target's extent by default.
+        Length that converts an error of angle into an error of position; half the target's extent by default.
     """
 
     angle: Any = entry(any_value, None)

@@ -296,7 +296,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     Raises
     ------
     InputError
-        If the task is not a path: the coupler of a cognate has other angles than that of the original.
+        If the task is not a path: the coupler of a cognate has other angles than the coupler of the original.
     ParameterError
         As `cognates`.
     AssemblyError
@@ -543,7 +543,7 @@ class _SwingShapes:
         self.chord = chord
 
     def ratios(self, l3: float) -> tuple[FloatArray, bool]:
-        """Return l1 ... l4 over l4 for a ratio l3, and whether the dead centres need the same assembly."""
+        """Return l1 ... l4 divided by l4 for a ratio l3, and whether the dead centres need the same assembly."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e

@@ -503,7 +503,10 @@ class SliderCrank(Linkage):
 
     @property
     def absent_dimensions(self) -> tuple[str, ...]:
-        """Return the names of the missing dimensions: the rocker's length, and those of a coupler point that is the pin."""
+        """Return the names of the dimensions that this slider-crank does not have.
+
+        It has no rocker length; if the coupler point is the pin C, it also has no distance and angle of this point.
+        """
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 
     def slider_position(self, rotation: ArrayLike) -> FloatArray:

@@ -112,8 +112,8 @@ class MachineSpec:
     pin : float, optional
         Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
     slider_mass, slider_stiffness, slider_damping : float, optional
-        Properties of the slider that carries D (kg, N/m, N.s/m); by default those of a block on a spring so stiff that D
-        hardly moves.
+        Properties of the slider that carries D (kg, N/m, N.s/m); by default the properties of a block on a spring so stiff that
+        D hardly moves.
     slider_coulomb_friction : float
         Coulomb friction of the slider (N).
     slider_spring_free_position : float
@@ -180,7 +180,7 @@ class MachineSpec:
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
     def link_masses(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Return masses and moments of inertia of the links: those in ``made``, unless this specification gives a link's mass.
+        """Return masses and moments of inertia of the links: as in ``made``, but with each mass that this specification gives.
 
         The moment of inertia of a link with a given mass changes in proportion to its mass.
         """
@@ -198,7 +198,7 @@ class MachineSpec:
 
     @property
     def block_mass(self) -> float:
-        """Return the mass of the slider (kg): as given, or else that of a block of the bars' material.
+        """Return the mass of the slider (kg): as given, or else the mass of a block of the bars' material.
 
         The block is four bar widths long, two bar widths wide and four bar thicknesses high.
         """
@@ -338,7 +338,7 @@ def pin_functions(
     straight : bool
         Whether the coupler point is on the line of B and C, see `link_mass_properties`.
     linkage : type
-        Type of the linkage; for a slider-crank the force at D is that of the guide on the slider.
+        Type of the linkage; for a slider-crank the force at D is the force of the guide on the slider.
     on_slider : bool
         Whether the coupler point is the pin C of a slider-crank, whose slider then carries the load.
     """
@@ -409,7 +409,7 @@ def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float
     Parameters
     ----------
     linkage : Linkage
-        A linkage with a fixed pivot, or a slider-crank, for which the force at D is that of the guide on the slider.
+        A linkage with a fixed pivot, or a slider-crank, for which the force at D is the force of the guide on the slider.
     make : MachineSpec
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.

@@ -212,7 +212,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     ----------
     solution : Solution
     rotation : float, optional
-        Crank rotation (rad); by default the first one at which the links can be joined.
+        Crank rotation (rad); by default the first rotation of the task, or else of a turn, at which the links can be joined.
     poses : int
         Number of further positions, in thin lines, at equal steps over the task.
     title : str
@@ -351,7 +351,7 @@ def _number_box(dimension: Dimension) -> Any:
 
 
 def _plate_holes(solution: Solution) -> dict[str, dict[str, complex]]:
-    """Return the places of the holes of each plate relative to its first one (m), by the plate's name and the pin's letter."""
+    """Return the places of the holes of each plate relative to its first hole (m), by the plate's name and the pin's letter."""
     linkage = solution.linkage
     coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
     if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
@@ -659,7 +659,7 @@ def description(
 
 
 def _spring_table(make: MachineSpec) -> dict[str, Any]:
-    """Return spring, damper and friction of the slider as a description has them; without those that are zero."""
+    """Return the entries of a description for spring, damper and friction of the slider, without entries that are zero."""
     values = {
         "stiffness": (make.slider_stiffness, "N/m"),
         "free": (make.slider_stiffness and make.slider_spring_free_position, "m"),

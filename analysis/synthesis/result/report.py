@@ -98,8 +98,8 @@ def length_step(linkage: Linkage) -> float:
 def _residuals(linkage: Linkage, normal: Normal, rotation: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
     """Compute the derivatives of the m residuals by the k dimensions, (m, k), and the residuals, (m,), at rotations.
 
-    The residuals of points come first, then those of angles. The residuals of points are in x and y or, if ``across``, along
-    the normals of the curve.
+    The residuals of points come first, then the residuals of angles. The residuals of points are in x and y or, if ``across``,
+    along the normals of the curve.
     """
     columns = [column for _, _, column in _pivot_dimensions(linkage, rotation)]
     angular = normal.angle is not None

@@ -23,9 +23,9 @@ from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, Untime
 FloatArray = NDArray[np.float64]
 #: Fraction of the target's size squared below which an error is due to rounding.
 EXACT = 1e-14
-#: Points of a coupler curve with which an untimed path is evaluated: the thesis's 360.
+#: Number of points of a coupler curve with which an untimed path is evaluated: 360 as in the thesis.
 CURVE = 360
-#: Crank rotations at which a linkage is judged between its first and its last target.
+#: Number of crank rotations, between the first and the last target, at which a linkage is judged.
 CLOSELY = 1441
 #: Length of a link relative to the longest below which the link can hardly be built.
 SHORT = 0.01
@@ -347,7 +347,7 @@ class Solution(NotebookResult):
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations of the task: those of its stations, or rotations over a whole turn."""
+        """Return the crank rotations of the task's stations; for a closed untimed path, crank rotations over a whole turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return self.evaluation.rotation
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
@@ -358,7 +358,7 @@ class Solution(NotebookResult):
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 
     def station_rotations(self) -> FloatArray:
-        """Return the crank rotations of the task's stations; for a path without them, those at which the curve is nearest."""
+        """Return the crank rotations of the task's stations; if there are none, the rotations at which the curve is nearest."""
         normal = normal_form(self.task)
         given = normal.rotation if normal.rotation is not None else self.evaluation.rotation
         if given is not None and len(given) == normal.n:

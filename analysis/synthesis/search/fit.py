@@ -32,7 +32,7 @@ from .program import Answer, Program, Start, clip_to_bounds
 
 FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
-#: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
+#: Greatest number of iterations of SLSQP, and the change of the measure, relative to its first value, at which SLSQP ends.
 ITERATIONS, CHANGE = 100, 1e-7
 #: A direction is scaled by its mean square displacement. This fraction of the greatest displacement is added, to limit the
 #: scaling.

@@ -124,7 +124,7 @@ class _FiveBarShapes(_FourBarShapes):
     def meets_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return for each shape whether it meets the least transmission angle (rad) over a turn of the gears' input.
 
-        It is checked at `AROUND` rotations: first at a few of them, then, for the shapes that passed, at the others.
+        The angle is checked at `AROUND` rotations: first at a few of them, then, for the shapes that passed, at the others.
         """
         turned = limits.gears
         allowed = np.ones(len(shapes), dtype=bool)
@@ -306,7 +306,7 @@ def _place_shapes(
 
 
 def _drop_unjoined(normal: Normal, limits: Limits, found: Candidates) -> Candidates:
-    """Return the candidates; the quality is infinite for those whose links cannot be joined between two stations.
+    """Return the candidates, with infinite quality if the links cannot be joined between two stations.
 
     The distance BD is extreme where the crank passes the direction of the ground link.
     """

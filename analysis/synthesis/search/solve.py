@@ -158,9 +158,9 @@ def synthesize(
     task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
     bounds : mapping, optional
         (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
-        ``second_crank_length``. Equal bounds fix a dimension. Of several kinds of linkages, those without the dimension ignore
-        its bounds. By default links are at most five times the target's size; for a rocker function the ground link is 0.1 m
-        and the other links are at most 0.5 m.
+        ``second_crank_length``. Equal bounds fix a dimension. If several kinds of linkages are tried, a kind without the
+        dimension ignores its bounds. By default links are at most five times the target's size; for a rocker function the
+        ground link is 0.1 m and the other links are at most 0.5 m.
     constraints : sequence
         See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
     pivot : SliderUnknown or CrankUnknown, optional

@@ -43,7 +43,7 @@ GAP = 8.0
 SOUGHT = ("least", "least curve")
 #: Name of the bound of the greatest error; fraction of this bound by which the absolute value is smoothed near zero error.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
-#: Number of further rotations at which a `RotationRequirement` is bounded: those of its peaks in the previous solution.
+#: Number of further rotations at which a `RotationRequirement` is bounded: the rotations of its peaks in the previous solution.
 FURTHER = 8
 
 
@@ -171,7 +171,7 @@ class Statement:
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
         self._initial: list[Any] = []
         #: For each bounded motion of the pivot, or derivative of it: the order of the derivative, and parameters for the
-        #: rotations of its extremes and for the curvature there; number of extremes; the first two derivatives at them.
+        #: rotations of its extremes and for the curvature there; number of extremes; the first two derivatives at the extremes.
         self._peaks: list[tuple[int, Any, Any]] = []
         self._peak_count = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._peak_derivatives: list[Any] = []

@@ -281,7 +281,7 @@ class RotationRange(NamedTuple):
     def timed(self, what: str) -> FloatArray:
         """Return the task's crank rotations; raise InputError if it has none.
 
-        The error message begins with ``what``, the thing that needs the rotations.
+        The error message begins with ``what``, which names the constraint that needs the rotations.
         """
         if self.rotation is None:
             raise InputError(f"{what} needs crank rotations, and the task gives none")
@@ -651,7 +651,7 @@ class DeadCentre(_LimitPosition):
 
 
 class Toggle(_LimitPosition):
-    """Constraint, as `DeadCentre`: a toggle, in which the crank can turn no further, is at a rotation or in a range of them.
+    """Constraint, as `DeadCentre`: a toggle, in which the crank can turn no further, is at one rotation or in a range.
 
     In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
 

@@ -296,7 +296,7 @@ def _bending(h: FloatArray, closed: bool) -> FloatArray:
     return 0.5 * (k + k.T)
 
 
-#: Pieces of equal length into which a curve is cut to integrate a distance along it.
+#: Number of pieces of equal length into which a curve is cut to integrate a distance along it.
 PIECES = 2000
 
 
