@@ -139,7 +139,7 @@ assert len(result) == 21, len(result)
 
 
 def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
-    """Run the FMU with FMPy in a separate process, by default for twenty steps, up to 20 ms or the end of an experiment of it.
+    """Run the FMU with FMPy in a separate process, by default in twenty steps to 20 ms or to the end of one of its experiments.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ _CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
 
 @contextmanager
 def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
-    """Attribute to a command all files that are written inside this context."""
+    """Record a command as the writer of all files that are written inside this context."""
     token = _CURRENT.set(writing := Writing(command, force))
     try:
         yield writing

@@ -32,7 +32,7 @@ class Motion:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
         numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
-        #: index of the freedom along which a spring acts
+        #: for each spring that acts along a freedom: the index of this freedom
         self.along = {name: numbers[s.at] for name, s in self.description.springs.items() if s.at in numbers}
         self.counted, self.centred = counted, interface.centred_springs(counted)
         self.bodies = self.structure.bodies

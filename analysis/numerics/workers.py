@@ -258,7 +258,7 @@ def _run_round(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, lis
 
 
 def _ask_scheduler(client: Any) -> Mapping[str, Any]:
-    """Ask the scheduler of a cluster for its workers; raises WorkersLost if it does not answer in time."""
+    """Ask the scheduler of a cluster for its workers; raise WorkersLost if it does not answer in time."""
     try:
         workers: Mapping[str, Any] = client.sync(client.scheduler.identity, callback_timeout=_PATIENCE)["workers"]
     except Exception as error:
@@ -267,7 +267,7 @@ def _ask_scheduler(client: Any) -> Mapping[str, Any]:
 
 
 def _wait_for_cluster(client: Any, wait: Callable[[], Any]) -> Any:
-    """Call ``wait`` until it returns, and return its value; raises WorkersLost if the cluster is gone or has no workers."""
+    """Call ``wait`` until it returns, and return its value; raise WorkersLost if the cluster is gone or has no workers."""
     while True:
         try:
             return wait()

@@ -356,7 +356,7 @@ def _split_tables(
 def _check_drives(
     mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, ActingInput]
 ) -> None:
-    """Raise ParameterError if a groove of zero amplitude is a drive, or if a coordinate that is held has an initial rate."""
+    """Raise ParameterError if a groove of zero amplitude drives the shift, or a coordinate that is held has an initial rate."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"

@@ -214,7 +214,7 @@ def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
     return Piecewise(breaks, coefficients, unit)
 
 
-#: Shapes of a table between its points.
+#: Kinds of interpolation between the points of a table.
 SHAPES = ("linear", "cubic", "hold")
 
 
