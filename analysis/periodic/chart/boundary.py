@@ -116,7 +116,8 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     """Return a function that evaluates G = (y(T) - y(0), test) and its derivatives at unknowns (y(0), p) and a parameter q.
 
     p and q are the two parameters of the plane; y(0) and y(T) are the state y of the orbit at the beginning and at the end of
-    the period; test is `crossing_test` of ``kind``. ``scale`` has the scales of y(0) and p.
+    the period; test is `crossing_test` of ``kind``. ``scale`` has the scales of y(0) and p, and ``settings`` the ranges of p
+    and q; the period has ``turns`` common periods.
     """
     n = len(scale) - 1
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)

@@ -341,7 +341,8 @@ class _Survey:
     ) -> StabilityChart:
         """Return the complete chart: find the boundaries of all motions, make the long runs, and compute removing dampings.
 
-        ``around`` are the coexisting motions, if they were sought; ``steps`` gives the texts of the progress bars.
+        ``beside`` has the monodromy matrices of further motions, by name; ``around`` are the coexisting motions, if they were
+        sought; ``steps`` gives the texts of the progress bars.
         """
         true = self.matrix()
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
@@ -437,7 +438,10 @@ class _Survey:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow the boundary through a special point of a branch, unless this boundary is already known."""
+        """Follow the boundary through a special point of a branch, unless this boundary is already known.
+
+        ``place`` has the values of the two parameters at the point.
+        """
         if self._is_known(special, place):
             return
         what = f"the {special.kind.value} at {self.place(*place)}"

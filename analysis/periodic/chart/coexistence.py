@@ -202,8 +202,8 @@ def coexistence(
 def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArray:
     """Compute the motions at the m points of each row, shape (rows, m, MOST_ORBITS, n + 2).
 
-    The last axis has the largest multiplier, the amplitude, the index and the start. The motions of a point are sorted by
-    amplitude; entries after the last motion are NaN.
+    ``guesses`` are guesses of y, shape (count, n). The last axis has the largest multiplier, the amplitude, the index and the
+    start. The motions of a point are sorted by amplitude; entries after the last motion are NaN.
     """
     first, m = rows[0], rows[0].scales.shape[0]
     if any((row.flow, row.switched) != (first.flow, first.switched) for row in rows):
@@ -511,8 +511,9 @@ def _path(orbit: PeriodicOrbit) -> FloatArray:
 def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
     """Return the index of the coordinate for which motions differ most, in the coordinate or in its rate.
 
-    The measure is the range of all motions together, divided by the range of the motion that moves least. It is very large for
-    a pendulum that hangs still in one motion and swings in another; starts with the pendulum at rest do not lead to the latter.
+    ``moved`` are samples of y for each motion. The measure is the range of all motions together, divided by the range of the
+    motion that moves least. It is very large for a pendulum that hangs still in one motion and swings in another; starts with
+    the pendulum at rest do not lead to the latter.
     """
     least = np.min([np.ptp(y, axis=0) for y in moved], axis=0)
     ratio, half = (np.ptp(np.vstack(moved), axis=0) + _REST * scale) / (least + _REST * scale), len(scale) // 2
@@ -524,6 +525,7 @@ def _default_plane(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the ranges of a coordinate and of its rate: `_WIDTH` times the ranges over which the motions move.
 
+    ``moved`` are samples of y of all motions, ``first`` is the first motion, and ``place`` the index of the coordinate in y.
     The range of the coordinate is cut where the links cannot be joined. It is the full range of assembly, centred on the
     initial value, if the coordinate is at rest in all motions, or is an angle whose range would be cut. A rate that is zero in
     all motions has the range of an oscillation over the coordinate's range at the crank's speed.

@@ -326,7 +326,8 @@ def grid_points(
 ) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
     """Return the values of x and y of a grid, its rows of operating points, and the guesses for each row, shape (k, n).
 
-    Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is not a quantity.
+    ``count`` is the number of guesses in a set of `spread_starts`. Raises InputError if an axis is empty or not finite,
+    ParameterError if a text on an axis is not a quantity.
     """
     if isinstance(operation, NamedPlane):
         mechanism = find_mechanism(operation.parameters)

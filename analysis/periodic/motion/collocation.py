@@ -247,8 +247,9 @@ def _linearise_row(section, row, unit, y, w, desk):
 def _eliminate(system, unknowns, width):
     """Solve linear equations in lanes by elimination without pivoting; the last columns of ``system`` become the solutions.
 
-    ``width`` is the number of columns. The matrix is the identity minus a multiple of the element's length: pivoting is not
-    needed while elements are short. If the matrix is far from the identity, the corrections do not converge.
+    ``unknowns`` is the number of unknowns, ``width`` the number of columns. The matrix is the identity minus a multiple of the
+    element's length: pivoting is not needed while elements are short. If the matrix is far from the identity, the corrections
+    do not converge.
     """
     for c in range(unknowns):
         inverse = 1.0 / load(system, c * width + c)
@@ -538,7 +539,8 @@ class PieceSolution(NamedTuple):
 def _predict(firsts, starts, change, unit, neighbour, desk):
     """Extrapolate a neighbouring motion, in place, to the states ``starts`` at the beginnings of the pieces and another lambda.
 
-    The extrapolation is of first order; ``change`` is the change of lambda.
+    The extrapolation is of first order; ``change`` is the change of lambda. For ``firsts`` see `solve_pieces`; ``unit`` is the
+    time per radian of crank rotation.
     """
     y, w, moves = neighbour
     n = desk.shift.shape[0]
@@ -568,7 +570,8 @@ def _predict(firsts, starts, change, unit, neighbour, desk):
 def _correct_pieces(section, firsts, starts, y, w, desk, rows):
     """Correct y and w of pieces with given starts by one Newton step; return the greatest correction.
 
-    The greatest correction is relative to the scale of y. y at the ends of the pieces is written into ``rows``.
+    The greatest correction is relative to the scale of y. y at the ends of the pieces is written into ``rows``. For ``firsts``
+    see `solve_pieces`.
     """
     linearise(section, y, w, desk)
     n = desk.shift.shape[0]

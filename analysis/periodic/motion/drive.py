@@ -697,7 +697,10 @@ def start_ranges(
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that makes full turns."""
+    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that makes full turns.
+
+    Under a torque the last component of ``guess`` gives the crank's speed.
+    """
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 

@@ -487,8 +487,8 @@ def settle_motion(
 ) -> tuple[Status, FloatArray]:
     """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most.
 
-    A turn is here a common period, `Flow.period`. Whole turns of links do not count as a change. Return the status and the last
-    y, without whole turns.
+    A turn is here a common period, `Flow.period`; ``tolerance`` bounds the local error of the integrator. Whole turns of links
+    do not count as a change. Return the status and the last y, without whole turns.
     """
     settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
@@ -757,7 +757,10 @@ class OrbitEquations:
         return np.asarray(np.tile(scale * np.sqrt(pieces), pieces))
 
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
-        """Evaluate the residual with its exact derivatives; raise OrbitError if the integration over a piece fails."""
+        """Evaluate the residual with its exact derivatives; raise OrbitError if the integration over a piece fails.
+
+        ``unknowns`` are the states of all pieces in one vector, ``value`` is the value of the family's parameter.
+        """
         point = operating_point(*self.family.operation(value))
         starts = unknowns.reshape(self._shape).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)

@@ -188,7 +188,8 @@ def _follow(
 ) -> PeriodicOrbit | None:
     """Follow a stable motion to another speed; return None if the motion is lost or becomes unstable.
 
-    If the amplitude changes much, Newton's method may have jumped to another motion: the step is then halved.
+    ``last`` is the stable motion. If the amplitude changes much, Newton's method may have jumped to another motion: the step is
+    then halved, at most ``halvings`` times.
     """
     before = _speed_of_drive(last.drive)
     assert before is not None
@@ -503,7 +504,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which the undriven links in ``drive.ratios`` go round and the others only swing."""
+    """Find the periodic motions in which the undriven links with a ratio in the drive go round and the others only swing."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     ranges = start_ranges(point.parameters, point.drive, guess)

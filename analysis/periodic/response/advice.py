@@ -154,9 +154,10 @@ class Arc:
 def find_beginning(
     branches: Iterable[Branch], kind: Crossing, orbit: PeriodicOrbit, value: float, width: float
 ) -> SpecialPoint | None:
-    """Return the period doubling or branch point near a motion from which the motion's branch begins; None if there is none.
+    """Return the special point near a motion at which the motion's branch begins; None if there is none.
 
-    ``value`` is the value of the parameter at the motion, ``width`` the range of the parameter.
+    ``kind`` is the kind of the point, a period doubling or a branch point; ``value`` is the value of the parameter at the
+    motion, ``width`` the range of the parameter.
     """
     times = 2 if kind is Crossing.PERIOD_DOUBLING else 1
     points = [s for b in branches if times * b.turns == orbit.turns for s in b.special if s.kind is kind]

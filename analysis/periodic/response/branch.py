@@ -385,7 +385,10 @@ def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Fol
 
 
 def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
-    """Return the reason why a branch must not be followed beyond a point; empty if there is none."""
+    """Return the reason why a branch must not be followed beyond a point; empty if there is none.
+
+    ``largest`` is the greatest modulus of the multipliers up to which a branch is followed.
+    """
     orbit = point.data
     if orbit.largest > largest:
         return f"beyond this point a disturbance grows more than {largest:g} times per period (the largest Floquet multiplier)"
@@ -630,6 +633,9 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
 
 
 def has_motion(branches: Iterable[Branch], orbit: PeriodicOrbit, value: float, width: float) -> bool:
-    """Return whether one of the branches passes through a motion, which may be taken to begin at any turn of its period."""
+    """Return whether one of the branches passes through a motion, which may be taken to begin at any turn of its period.
+
+    For ``value`` and ``width`` see `passes`.
+    """
     starts = orbit.passages()
     return any(passes(b, value, start, width) for b in branches if b.turns == orbit.turns for start in starts)

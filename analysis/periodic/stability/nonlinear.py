@@ -254,7 +254,10 @@ _QUADRATIC = 1e-2
 
 
 def _is_transcritical(forms: Forms, cubic: float) -> bool:
-    """Return whether the map at a branch point has a quadratic coefficient: the crossing branch then exists on both sides."""
+    """Return whether the map at a branch point has a quadratic coefficient: the crossing branch then exists on both sides.
+
+    ``forms`` are the derivatives of the map, ``cubic`` is its cubic coefficient.
+    """
     whole, half = (form_coefficient(forms, Crossing.FOLD, 1.0, h) for h in (_STEP, 0.5 * _STEP))
     return abs(half) > max(_QUADRATIC * sqrt(abs(cubic)), abs(half - whole) / UNSETTLED)
 

@@ -454,7 +454,7 @@ _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 def _locate_motion(
     orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str, coordinate: int = 0
 ) -> PeriodicOrbit:
-    """Find the special point near a motion by Newton's method, and return the motion at this point.
+    """Find the special point near a motion by Newton's method along the parameter ``along``; return the motion at this point.
 
     Raises LinkworkError if Newton's method does not converge to a point near the motion; ``what`` names the point in the
     message.

@@ -44,7 +44,10 @@ def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatAr
 
 
 def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
-    """Check and return the unit that applies to numbers written without a unit."""
+    """Check and return the unit that applies to numbers written without a unit.
+
+    ``kind`` and ``example`` describe the units that are allowed, in messages; ``si`` is the SI unit of this kind.
+    """
     try:
         quantity(f"1 {value}", si, name)
     except ParameterError:
@@ -123,8 +126,8 @@ def _steps_or_list(value: Any, name: str) -> Any:
 def _rotation(value: Any, *targets: FloatArray) -> FloatArray | None:
     """Return the crank rotations of targets (rad) from `Steps` or a list; None if they are not given.
 
-    ``targets`` are columns with a row for each target. The end of a whole turn is its start: it has a target of its own only if
-    the last target repeats the first.
+    ``value`` is the entry of the table; ``targets`` are columns with a row for each target. The end of a whole turn is its
+    start: it has a target of its own only if the last target repeats the first.
     """
     if not isinstance(value, Steps):
         return None if value is None else np.array(value)

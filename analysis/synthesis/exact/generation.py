@@ -129,7 +129,7 @@ def function_generators(task: RockerFunction, *, crank_phase: Amount | None = No
 
 
 def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> str:
-    """Return the error message for n points and ``free`` unknowns, if the two numbers differ."""
+    """Return the error message for a number n of points that differs from the number ``free`` of unknowns."""
     unknown = ["three ratios of lengths"]
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
@@ -161,7 +161,8 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
     """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if there are no such links.
 
-    A link of negative length points in the opposite direction: its length becomes positive, and its angle changes by pi.
+    ``th2`` and ``th4`` are the angles of crank and rocker at the points, for the given crank phase and mounting angle. A link
+    of negative length points in the opposite direction: its length becomes positive, and its angle changes by pi.
 
     Raises InputError if the points leave infinitely many linkages.
     """
@@ -191,8 +192,9 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
     """Compute the links of the four-bars, three at most, that generate a function at five precision points.
 
-    Relative to the crank the rocker takes five poses. Each real dyad that guides the rocker through these poses, except the
-    ground link, is a coupler, with its pivot at B and its point at C.
+    ``phi`` are the crank's rotations, ``psi`` the rocker's angles. Relative to the crank the rocker takes five poses. Each real
+    dyad that guides the rocker through these poses, except the ground link, is a coupler, with its pivot at B and its point at
+    C.
     """
     places = np.exp(-1j * phi)
     try:
@@ -213,7 +215,7 @@ def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
 def _make_generator(
     task: RockerFunction, crank: float, coupler: float, rocker: float, crank_phase: float, mounting: float
 ) -> Solution:
-    """Build the four-bar with these links, in units of the ground link, and check it between the end points."""
+    """Build the four-bar with given links, see `Links`, and check it between the first point and the last."""
     th2 = np.asarray(task.rotation) + crank_phase
     th4 = np.asarray(task.angle) - mounting
     b, c = crank * np.exp(1j * th2), 1.0 + rocker * np.exp(1j * th4)
@@ -644,7 +646,7 @@ def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
 
 
 def _bound_margins(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> FloatArray:
-    """Return by how much offset and crank exceed each of their bounds (m)."""
+    """Return by how much offset and crank exceed each of their bounds ``ends`` (m), for a coupler length l3."""
     lengths = np.array(_lengths(l3, task.advance, float(task.stroke)))
     return (lengths[:, None] - [ends["ground_length"], ends["crank_length"]]).ravel()
 
@@ -652,7 +654,8 @@ def _bound_margins(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float,
 def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
     """Return the cosine of the least transmission angle over a turn.
 
-    The result is 1 if no linkage exists, a bound is violated, or the dead centres need different assemblies.
+    ``l3`` is the coupler length, ``ends`` has the bounds of offset and crank. The result is 1 if no linkage exists, a bound is
+    violated, or the dead centres need different assemblies.
     """
     stroke = float(task.stroke)
     l1, l2 = _lengths(l3, task.advance, stroke)

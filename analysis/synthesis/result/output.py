@@ -307,7 +307,10 @@ def _coupler_line(pins: Mapping[str, Point], least: float) -> str:
 def _link_dimensions(
     pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
 ) -> Iterator[Dimension]:
-    """Yield the dimension of each link, placed beside it with few overlaps; for a slider-crank also the offset."""
+    """Yield the dimension of each link, placed beside the link with few overlaps; for a slider-crank also the offset.
+
+    ``height`` is the height of a letter (m), and ``others`` are further lines that the dimensions should not overlap.
+    """
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
@@ -441,7 +444,8 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
 def _hole_dimensions(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
     """Yield the two end points and the offset (m) of the dimension between each two distinct holes.
 
-    The dimensions lie outside the plate and do not overlap.
+    ``places`` are the holes as complex numbers (m), ``width`` is the width of the plate. The dimensions lie outside the plate
+    and do not overlap.
     """
     for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
         way = places[k] - places[i]

@@ -264,7 +264,7 @@ def _is_link(linkage: Linkage, name: str) -> bool:
 
 
 def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
-    """Return the mean of |x| for normal variables x with these means and standard deviations."""
+    """Return the mean of |x| for normal variables x with the means ``mean`` and the standard deviations ``spread``."""
     from scipy.special import erf
 
     safe = np.maximum(spread, 1e-300)
@@ -512,7 +512,10 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return quality function, rms error and greatest error of a solution as texts; "0" for errors due to rounding."""
+    """Return quality function, rms error and greatest error of a solution as texts; "0" for errors due to rounding.
+
+    ``digits`` is the number of significant digits of the quality function.
+    """
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
     if _meets_task(solution):

@@ -267,7 +267,7 @@ def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
 
 
 def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Return the phase of the second crank: a sampled angle plus the gear ratio times ``phase``, the first crank's phase.
+    """Return the phase of the second crank: an angle from ``shapes``, plus the gear ratio times the first crank's ``phase``.
 
     With this sum the first crank's phase does not affect the coupler curve.
     """

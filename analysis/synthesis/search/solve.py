@@ -356,7 +356,7 @@ def _search_kind(
 
 
 def _merge_kinds(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
-    """Return the best ``count`` solutions, which include the best solution of each kind of linkage."""
+    """Return the best ``count`` solutions of several rankings ``found``, with the best solution of each kind of linkage."""
     every = rank_solutions([s for part in found for s in part])
     first = {s.linkage.kind: s for s in reversed(every)}.values()
     rest = [s for s in every if not any(s is best for best in first)]
@@ -436,7 +436,11 @@ def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | 
 def _make_result(
     task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
 ) -> Synthesis:
-    """Return the result of a search with its number of starts and duration; raise an error if it has no solution."""
+    """Return the result of a search; raise an error if the search has no solution, or was interrupted.
+
+    ``done`` are the answers from which the solutions ``found`` were made, ``total`` is the number of starts of a whole search,
+    and ``begun`` the time at which the search began (s).
+    """
     result = Synthesis(
         task=task,
         solutions=found,

@@ -449,7 +449,10 @@ class Statement:
         return phi, knots
 
     def _constrain_shape(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
-        """Constrain the links to the Grashof type, and the fixed pivots to their regions."""
+        """Constrain the links to the Grashof type, and the fixed pivots to their regions.
+
+        ``grashof`` has the coefficients of `program._grashof_rows`, ``planes`` the rows of `half_planes` for each region.
+        """
         casadi, limits = self._casadi, self.limits
         if limits.grashof:
             links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)

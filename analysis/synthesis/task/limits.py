@@ -369,7 +369,7 @@ def check_greatest_length(name: str, high: float) -> None:
 def complete_bounds(
     name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the bounds of dimension ``name``: the given ``ends``, or the default for an end that is None or infinite."""
+    """Return the bounds of dimension ``name``: the given ``ends``; an end that is None or infinite is from ``usual``."""
     try:
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
