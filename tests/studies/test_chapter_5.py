@@ -125,7 +125,11 @@ def test_angles_of_the_listing_hardly_change_the_axis() -> None:
 
 
 def test_held_angles_need_another_ground_link() -> None:
-    assert with_held_angles(1.2).ground_length > 1.05 * with_same_ground(1.2).ground_length
+    """The ground link is that from D to A in the closed loop: 1.1 and 0.173 l4 along and across the guide at sigma3 = 1.2."""
+    for sigma3, along, across in ((1.2, 1.1, 0.1 * 3**0.5), (0.8, 0.9, -0.1 * 3**0.5)):
+        held, same = with_held_angles(sigma3), with_same_ground(sigma3)
+        assert held.ground_length / same.ground_length == pytest.approx(np.hypot(along, across))
+        assert held.slider_guide_angle == pytest.approx(-np.arctan2(across, along))
 
 
 def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:

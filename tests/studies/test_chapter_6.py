@@ -5,6 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from analysis.studies.statements import near
 from analysis.studies.youssef import quality, search
@@ -127,6 +129,36 @@ def test_half_units_of_printed_digits() -> None:
     """5.083, 2.615, 4.148 and 3.75 cm, 41.88 deg; the rest is not printed."""
     expected = [0.0, 0.0, 5e-6, 5e-6, 5e-6, 5e-5, 0.0, 0.0, np.radians(5e-3), 0.0]
     np.testing.assert_allclose(half_units(PROBLEMS["rocker"].linkage), expected, rtol=1e-12)
+
+
+def _excess(name: str, n: int, end: bool) -> float:
+    """Return how far the least sum of squared errors lies above its minimum as the printed digits are rounded, relative to it.
+
+    The rocker's angle follows from the triangle of B, C and D; the ground link keeps its length, since the scale is free.
+    """
+    l1, *links, phase = np.take(published.CHAPTER_6[name], [2, 3, 4, 5, 8])
+    turned = 360.0 / n * np.arange(n + end)
+    heavy = (name == "rocker") | ((turned > 59.9) & (turned < 260.1))
+
+    def errors(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        to_b = x[0] * np.exp(1j * np.radians(turned + x[3])) - l1
+        at_d = np.arccos((np.abs(to_b) ** 2 + x[2] ** 2 - x[1] ** 2) / (2.0 * np.abs(to_b) * x[2]))
+        off = np.degrees(np.angle(to_b) % (2.0 * np.pi) - at_d) - 70.0 - 100.0 * np.sin(np.radians(turned) / 2.0)
+        return np.asarray(off * np.where(heavy, 1.0, 1000.0**-0.5))
+
+    x, half = np.array([*links, phase]), np.array([5e-4, 5e-4, 5e-3, 5e-3] if name == "rocker" else 4 * [5e-3])
+    rounded, free = (
+        least_squares(errors, x, bounds=bounds, x_scale=[1.0, 1.0, 1.0, 10.0], xtol=1e-13, ftol=1e-13, gtol=1e-13).cost
+        for bounds in ((x - half, x + half), (-np.inf, np.inf))
+    )
+    return float(rounded / free - 1.0)
+
+
+def test_the_printed_rocker_functions_are_minima_at_every_tenth_degree() -> None:
+    for name in ("rocker", "rocker-weighted"):
+        assert _excess(name, 36, True) < 1e-4
+        for n, end in ((24, False), (24, True), (36, False), (72, False), (72, True)):
+            assert _excess(name, n, end) > 4e-4
 
 
 @pytest.mark.slow

@@ -343,7 +343,7 @@ def _abnormal() -> Statement:
             *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
             at_least("share that is roundoff", 0.5, _roundoff(method.joints(unknowns))),
         ),
-        "38a, 40a and 41a are unbounded because eq 41 divides by sin theta2; roundoff is not the cause",
+        "38a, 40a and 41a are unbounded because eqs 41 and 42 divide by sin theta2; roundoff is not the cause",
     )
 
 

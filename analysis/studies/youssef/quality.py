@@ -26,8 +26,7 @@ from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best
-from .problems import AREA_N, CM2_PER_M2, PROBLEMS
-from .stated_errors import printed_error
+from .problems import AREA_N, AS_FOUND, CM2_PER_M2, PROBLEMS
 
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
 LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
@@ -94,20 +93,23 @@ def least_combined(start: Linkage) -> Linkage:
     return linkage(x)
 
 
-def descent_error(name: str) -> float:
-    """Return the error (unit of print) at the end of a descent that starts from the printed linkage of a problem."""
-    p, longest = PROBLEMS[name], PROBLEMS[name].linkage.largest_link
+def descent_ratio(name: str) -> float:
+    """Return the error of the printed linkage, relative to that at the end of a descent from it.
+
+    A rocker function is taken as in `AS_FOUND`.
+    """
+    p, longest = AS_FOUND.get(name, PROBLEMS[name]), PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
     bounds = {**dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)), **p.bounds}
     limits = [tuple(np.array(bounds.get(d, (-np.inf, np.inf))) / u) for d, u in zip(p.linkage.values(), unit)]
-    first = printed_error(name)
+    first = p.linkage_error(p.linkage)
 
     def error(x: FloatArray) -> float:
         found = p.linkage_error(Linkage.from_vector(x * unit, p.linkage.branch)) / first
         return found if np.isfinite(found) else REFUSED
 
     options = {"ftol": 1e-9, "maxiter": STEPS}
-    return first * float(minimize(error, p.linkage.vector / unit, method="SLSQP", bounds=limits, options=options).fun)
+    return 1.0 / float(minimize(error, p.linkage.vector / unit, method="SLSQP", bounds=limits, options=options).fun)
 
 
 @cache
@@ -184,7 +186,7 @@ def compute() -> StudyResult:
 
 def judge_qualities(timed: Quality, path: Quality, found: Quality) -> tuple[Statement, ...]:
     """Judge the statements on the quality functions, by our best linkages for the time, for the path, and for both."""
-    ratios = {f"Fig {n}": printed_error(row.problem) / descent_error(row.problem) for n, row in TABLE.items()}
+    ratios = {f"Fig {n}": descent_ratio(row.problem) for n, row in TABLE.items()}
     return (
         Statement(
             "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. "
