@@ -166,7 +166,7 @@ class StabilityChart(NotebookResult):
     most : int
         Greatest number of stable motions found at one point of the searched lines or of the grid of ``beside``.
     beside : Coexistence or None
-        All motions at every point of the grid; None if they were not asked for.
+        All motions at every point of the grid; None unless `stability_chart` was called with ``coexisting``.
     problems : tuple of str
         One sentence for each part that could not be computed; empty if there is none.
     """

@@ -156,8 +156,8 @@ def coexistence(
     x, y : array_like, shapes (nx,) and (ny,)
         See `grid`.
     start : array_like, shape (n,), optional
-        A further guess. If the crank is driven by a torque, it is required because it gives the crank speed, unless the speed
-        follows from a motor.
+        A further guess. If the crank is driven by a torque, this guess is required, because it gives the crank speed; unless
+        the speed follows from a motor.
     folder, n_jobs, progress, what
         See `grid`.
 

@@ -56,8 +56,8 @@ class Status(IntEnum):
 
 # the statuses as plain integers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-#: Least step of the integrator (rad), and the greatest number of steps per turn of the crank: without it the integration from a
-#: start near a singular position, such as a slide at the pin of its guide, would not end.
+#: Least step of the integrator (rad), and the greatest number of steps per turn of the crank: without this limit the
+#: integration from a start near a singular position, such as a slide at the pin of its guide, would not end.
 LEAST_STEP, MOST_STEPS = 1e-12, 50000
 #: Message for each status that is a failure.
 REASONS = {

@@ -68,7 +68,7 @@ SAMPLES = 256
 _MOST_SAMPLES, _SHARP = 8192, 1e-5
 #: Error of an amplitude, relative to the scale of the coordinate: a little more than the error of the orbits.
 _ROUNDING = 10.0 * ORBIT_TOLERANCE
-#: Outputs that an orbit does not have: they count from the start of a run.
+#: Outputs that an orbit does not have: energies that accumulate from the start of a run.
 OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
 

@@ -128,7 +128,7 @@ def sweep(
     speeds : array_like, shape (m,) or ()
         Speeds (rad/s), increasing or decreasing.
     drive : Drive, optional
-        Drive with the other inputs. Its speed is replaced; if it has a motor instead, the motor's synchronous speed.
+        Drive with the other inputs. The speed of the drive, or the synchronous speed of its motor, is replaced.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0 for the first speed: for a five-bar u (m) and u' (m/s). By default the coordinates with
         which the mechanism starts, at rest.

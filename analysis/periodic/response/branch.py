@@ -265,7 +265,7 @@ def switch(
         See `follow`.
     special : SpecialPoint
     side : float
-        +1 or -1: direction in which the new branch is followed; it leaves a branch point in both directions.
+        +1 or -1: direction in which the new branch is followed; a branch leaves a branch point in both directions.
     largest : float
         The branch ends when its largest multiplier passes this value.
 

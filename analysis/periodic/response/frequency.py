@@ -567,8 +567,8 @@ def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
     )
 
 
-#: Distance of two special points in the parameter, relative to the range, below which they are the same point; its square root
-#: is the distance of their motions, relative to the scale, below which they are the same.
+#: Distance of two special points in the parameter, relative to the range, below which they are the same point, if the distance
+#: of their motions, relative to the scale, is also below the square root of this value.
 _SAME_POINT = 1e-6
 
 

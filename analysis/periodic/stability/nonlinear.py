@@ -366,8 +366,8 @@ class Confirmation:
     outcome : Outcome
     growth : float
         Growth factor of the deviation per turn, along the direction of the leading multiplier, by regression over the turns
-        before the deviation is lost in rounding errors or exceeds a hundredth of the scale of y; only a bound if this happens
-        within the first turn.
+        before the deviation is lost in rounding errors or exceeds a hundredth of the scale of y; if it is lost or exceeds this
+        limit within the first turn, the factor is only a bound.
     deviations : ndarray, shape (n,)
         Distance from the orbit at crank angle 0 of each turn, relative to the first distance, up to the end of the run.
     message : str

@@ -165,7 +165,7 @@ class Variations:
 
     @property
     def _joined(self) -> NDArray[np.bool_]:
-        """Whether the motion goes on without a gap from each panel to the next; from the last to the first if it is closed."""
+        """Whether the motion goes on without a gap from each panel to the next and, if closed, from the last to the first."""
         joined = np.ones(len(self.h), dtype=bool)
         joined[-1] = self.orbit.residual <= _CONTINUOUS
         return joined

@@ -243,7 +243,7 @@ class TradeOffTable:
     starts: int = files.entry(files.Whole(1), 12)
 
 
-#: The table ``[bounds]``: [least, greatest], or one value that fixes the dimension.
+#: The table ``[bounds]``: for each dimension [least, greatest], or one value that fixes the dimension.
 BOUNDS = files.Table(
     dict,
     {

@@ -267,7 +267,7 @@ class _Curve(_ObjectiveAndRange):
         return found, closed if self.closed is None else self.closed
 
     def _timed_points(self, folder: Path, *given: Any) -> FloatArray:
-        """Return the points in m; if a file's last point repeats the first, it is kept only if it has a value in ``given``.
+        """Return the points in m; the last point of a file, if it repeats the first, is kept only if ``given`` has its value.
 
         ``given`` are crank rotations, as `Steps` or a list, and a list of angles; each may be None.
         """
@@ -473,7 +473,7 @@ class QuickReturnTable:
         return QuickReturn(stroke=float(self.stroke or 0.0), time_ratio=self.time_ratio)
 
 
-#: The table ``[task]`` of each kind.
+#: Class of the table ``[task]`` for each kind of task.
 KINDS: Mapping[str, type] = {
     "timed-path": TimedPathTable,
     "untimed-path": UntimedPathTable,

@@ -454,7 +454,7 @@ class QuickSwing(RockerFunction):
 
 
 def _advance(time_ratio: float) -> float:
-    """Return `crank_advance`; raise ParameterError if the time ratio is not a finite number of 1 or more."""
+    """Return the `crank_advance` of a time ratio; raise ParameterError if the ratio is not a finite number of 1 or more."""
     if not (isfinite(time_ratio) and time_ratio >= 1.0):
         raise ParameterError("time ratio", time_ratio, "be a finite number of 1 or more")
     return crank_advance(time_ratio)

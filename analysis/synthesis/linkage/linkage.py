@@ -505,7 +505,8 @@ class SliderCrank(Linkage):
     def absent_dimensions(self) -> tuple[str, ...]:
         """Return the names of the dimensions that this slider-crank does not have.
 
-        It has no rocker length; if the coupler point is the pin C, it also has no distance and angle of this point.
+        A slider-crank has no rocker length. If the coupler point is the pin C, the linkage also has no distance and no angle of
+        this point.
         """
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 

@@ -259,7 +259,7 @@ class MachineSpec:
         )
 
     def plant_values(self, d: Any, straight: bool, sliding: bool, law: Callable[..., dict[str, Any]]) -> dict[str, Any]:
-        """Return the parameters of the five-bar plant for a linkage, by name, without those of the plant's slider.
+        """Return the parameters of the five-bar plant for a linkage, by name, without the parameters of its slider.
 
         Parameters
         ----------
@@ -313,7 +313,7 @@ USUAL_MAKE = MachineSpec()
 
 FloatArray = NDArray[np.float64]
 PINS = "ABCD"
-#: Number of steps of the crank between the rotations at which pin forces are computed.
+#: Number of equal steps of the crank, at the ends of which pin forces are computed.
 SAMPLES = 720
 
 
@@ -554,8 +554,9 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     """Return the torque on the rocker divided by the torque on the crank, without friction and masses.
 
     For a slider-crank the mechanical advantage is the force on the slider divided by the force on the crank pin perpendicular
-    to the crank, which equals the speed of the pin divided by the speed of the slider. It is infinite in a dead centre, zero
-    in a toggle, and NaN if the links cannot be joined. The result has the shape of ``rotation``, the crank rotations (rad).
+    to the crank, which equals the speed of the pin divided by the speed of the slider. The mechanical advantage is infinite in
+    a dead centre, zero in a toggle, and NaN if the links cannot be joined. The result has the shape of ``rotation``, the crank
+    rotations (rad).
 
     Raises ParameterError if the rocker pivot moves.
     """

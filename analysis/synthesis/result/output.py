@@ -530,7 +530,7 @@ def run_case(solution: Solution, make: MachineSpec, title: str) -> dict[str, Any
 
 
 def neglected_load(linkage: Linkage, make: MachineSpec) -> str:
-    """Return a sentence that says which part of the load the case of `run_case` leaves out; empty if it has the whole load."""
+    """Return a sentence that says which part of the load the case of `run_case` leaves out; empty if it leaves out nothing."""
     if not isinstance(linkage, SliderCrank) or not any(make.load):
         return ""
     across, along = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
@@ -547,7 +547,7 @@ def neglected_load(linkage: Linkage, make: MachineSpec) -> str:
 def settle_slider(
     parameters: FiveBarParameters, acting: Inputs, crank_angle: float, duration: float
 ) -> tuple[float, float]:
-    """Find the position (m) and velocity (m/s) to which a slider returns after ``duration`` (s); zeros if none is found.
+    """Find the position (m) and velocity (m/s) to which a slider returns after ``duration`` (s); zeros if it does not return.
 
     If the run is a turn at constant speed, the result belongs to the steady motion at ``crank_angle``; if the crank is at rest,
     to the equilibrium. The run is repeated, at most `SETTLING` times, until the slider returns to within a millionth of its

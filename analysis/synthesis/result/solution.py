@@ -217,8 +217,8 @@ class Verdicts:
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     """Check a linkage for defects between the least and the greatest of its crank rotations, or if ``closed`` over a turn.
 
-    The distance from crank pin to rocker pivot determines the transmission angle. It is evaluated at closely spaced rotations
-    and, with a fixed pivot, where the crank lies along the ground link.
+    The distance from crank pin to rocker pivot determines the transmission angle. The distance is evaluated at closely spaced
+    rotations and, with a fixed pivot, where the crank lies along the ground link.
     """
     steps = np.diff(rotation)
     order = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
@@ -366,7 +366,7 @@ class Solution(NotebookResult):
         return nearest_rotations(self.linkage, normal.places, *self.traced_range())
 
     def traced_range(self) -> tuple[float, float]:
-        """Return the crank rotations between which the linkage traces the path of an untimed task: a turn if it is closed."""
+        """Return the crank rotations between which the linkage traces the path of an untimed task: a turn for a closed path."""
         at = self.evaluation.rotation
         if at is None or (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return 0.0, 2.0 * pi

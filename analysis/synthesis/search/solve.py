@@ -62,7 +62,8 @@ from .scan import scan
 
 #: Number of stations of an untimed path with a moving pivot: more than with a fixed one, as harmonics cause waves in the curve.
 STATIONS = 144
-#: Untimed points that a four-bar can pass exactly, and the factor by which starts are increased until it passes them.
+#: Number of untimed points that a four-bar can pass exactly, and factor by which starts are increased until one passes the
+#: points.
 MOST_EXACT, AGAIN = 9, 4
 
 
@@ -581,8 +582,8 @@ def trade_off(
     """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
     From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the previous
-    problem. A solution of a tighter limit also meets the next looser limit: a second pass in the opposite direction uses it for
-    this limit as well, unchanged or optimised again. Thus the error can only grow as the limit is tightened.
+    problem. A solution of a tighter limit also meets the next looser limit: a second pass in the opposite direction uses such a
+    solution for the looser limit as well, unchanged or optimised again. Thus the error can only grow as the limit is tightened.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class LeastTransmission:
     angle : float
         Least deviation (rad).
     over : "turn" or "task"
-        Over a full turn, so that the crank can turn fully, or only during the task.
+        Where the angle is bounded: over a full turn, so that the crank can turn fully, or only during the task.
     """
 
     angle: Amount = _LEAST_TRANSMISSION
@@ -208,7 +208,7 @@ class RotationRequirement(Require):
 
     @classmethod
     def between(cls, ends: tuple[float, float], **more: Any) -> RotationRequirement:
-        """Bound a function between two crank rotations (rad); ``more`` are further fields, such as the function."""
+        """Return a requirement between two crank rotations (rad); ``more`` are the other fields, such as the function."""
         turn = ends[1] - ends[0] >= 2.0 * pi
         # beyond a full turn, to find a peak at its end
         over = BEYOND if turn else 0.0
@@ -456,7 +456,7 @@ class _Forces(Demand):
 @in_si(force="N")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaxPinForce(_Forces):
-    """Constraint: no pin force exceeds ``force``, over a turn of the crank or, if it need not turn fully, during the task.
+    """Constraint: no pin force exceeds ``force``, over a turn or, if the crank need not turn fully, during the task.
 
     Attributes
     ----------
@@ -560,7 +560,7 @@ class MechanicalAdvantage(Demand):
 
     @property
     def excludes_rest(self) -> bool:
-        """Return whether the greatest advantage is bounded everywhere: it is infinite in a dead centre."""
+        """Return whether the greatest advantage is bounded everywhere: in a dead centre the advantage is infinite."""
         return self.at is None and isfinite(self.greatest)
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
