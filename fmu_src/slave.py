@@ -51,7 +51,7 @@ STATUS = (
     (ParameterError, 6),
 )
 
-#: What a saved state keeps as it is, beside values and plant.
+#: Attributes of a slave that a saved state contains unchanged, besides values and plant.
 _SAVED = ("phase", "stale", "cause", "start_time", "stop_time", "master_tolerance")
 
 #: Reason why a new value is refused during a run, by causality of the variable.
@@ -115,7 +115,7 @@ class LinkworkSlave(Fmi2Slave):
         self._plant: Plant | None = None
         self._phase = INSTANTIATED
         self._stale = True
-        #: status and message of a failure since the last good step; calls out of order do not count
+        #: status and message of a failure since the last good step; a call that is refused as out of order does not set it
         self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
         self._stop_time: float | None = None

@@ -58,7 +58,7 @@ def is_current() -> bool:
 
 
 def build_page() -> str:
-    """Return the HTML of the page that `npm run build` wrote with all registered mechanisms, which Zig compiles to WebAssembly.
+    """Add all registered mechanisms, compiled to WebAssembly by Zig, to the page that `npm run build` wrote; return the HTML.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from ..export import Entry, build_web, crank_index, interface
 from ..mechanisms import name_in_files
 from ..periodic import OF_A_RUN, Drive, damping_name, find_crank, free_position_name, motor_parameters, stiffness_name
 
-#: Sections of parameters by role, and by unit; all others are dimensions.
+#: Section of the page for a parameter, by its role or, if the role has none, by its unit; all other parameters are dimensions.
 _SECTIONS = {
     "gravity": "Gravity",
     **dict.fromkeys(("stiffness", "damping", "friction", "spring", "law"), "Spring, damper, friction"),
@@ -25,7 +25,7 @@ _SECTIONS = {
 DRIVE = "Drive and loads"
 #: Fields of a motor that is not given: no torque, a usual slip, and the speed of four poles at 50 Hz (rad/s).
 NO_MOTOR = {"breakdown_torque": 0.0, "breakdown_slip": 0.2, "synchronous_speed": 50.0 * math.pi}
-#: Tolerance of a run on the page, smaller than that of a run by default.
+#: Tolerance of a run on the page, smaller than the default of other runs.
 TOLERANCE = 1e-12
 
 
@@ -165,7 +165,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 
 def _coupled_turns(mechanism: Mechanism, crank: int) -> dict[int, float]:
-    """Return the turns, per turn of the crank, of the free rotations that springs couple to it, by the index of the freedom."""
+    """Return, by index, the turns of each free rotation that springs couple to the crank, per turn of the crank."""
     if crank < 0:
         return {}
     forces = {c.name: 0.0 for c in mechanism.channels if c.kind == "force" and c.freedom not in (-1, crank)}
@@ -229,8 +229,8 @@ def _outputs_with_rates(mechanism: Mechanism) -> list[str]:
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
     """Return the charts of the page.
 
-    The entry ``of`` of a curve lists the index of an output, or of several: the curve then shows the magnitude of their
-    vector. Powers have the indices after all outputs and all coordinates of joints: see studio.c.
+    The entry ``of`` of a curve lists indices of outputs. A curve with several outputs shows the magnitude of the vector whose
+    components they are. Powers have the indices after all outputs and all coordinates of joints: see studio.c.
     """
     names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())

@@ -8,8 +8,8 @@ from math import fabs, sqrt, tanh
 FRICTION_SPEED = 1e-3
 #: Relative angular velocity of the links of a pin (rad/s) at which its friction has reached 76 % of its level.
 FRICTION_RATE = 0.1
-#: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2). A linkage
-#: described with less than 100 g has 0.1 N for each kg.
+#: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2). For a
+#: described linkage of less than 100 g, F0 is 0.1 N per kg of its mass.
 FRICTION_FORCE = 1e-2
 #: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 the links may jam.
 MOST_RESPONSE = 0.8

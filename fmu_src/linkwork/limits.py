@@ -17,11 +17,11 @@ NEAR_LIMIT = 0.05
 #: Reasons why a motion ends, as messages name them.
 ASSEMBLY = "limit of assembly"
 JAMMING = "friction so strong that it may jam the links"
-#: What is wrong where accelerations or outputs are not finite whatever the inputs.
+#: Reasons for accelerations or outputs that are not finite even with all inputs zero, as messages name them.
 MASSLESS = "what a force moves has no mass or moment of inertia"
 NO_ACCELERATION = f"{MASSLESS}, a force law has no value, or a speed or parameter is too large"
 
-#: What a run says of a spring whose whole turns are not counted, as the end of "the torque of SPRING at t = TIME s".
+#: End of the message on a spring whose whole turns are not counted; it begins "the torque of SPRING at t = TIME s".
 SLIPPED = (
     "jumps, because its angle passes plus or minus half a turn: whole turns of this angle are not counted; a freedom at the "
     "pin would count them"

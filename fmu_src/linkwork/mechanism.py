@@ -318,7 +318,7 @@ class Mechanism:
     greatest_rotation : float
         Largest change of an angle among the freedoms in a step of the integrator (rad), and of a translation relative to its
         ``error_scale``, so that no step passes over a force that acts over a small angle only, and none over a limit of
-        assembly; infinite if there is neither.
+        assembly; infinite if the mechanism has neither such a force nor a limit of assembly.
     switch : str
         Name of the only constant on which the equations may branch: they may differ between zero and positive values of this
         constant. The equations are traced once for each of the two cases, so that terms that are switched off cost nothing.

@@ -72,13 +72,13 @@ class Rules(NamedTuple):
 
 
 class CheckedParameters:
-    """Base of a mechanism's parameters, a frozen dataclass: its fields are checked against its ``RULES``, made plain numbers.
+    """Base of a mechanism's parameters, a frozen dataclass: its fields are checked against ``RULES`` and made plain numbers.
 
     Raises
     ------
     ParameterError
-        For the first field that breaks a rule, or is too large or too small to compute with; if none is, but a constant of
-        the equations is not finite, for the field of the most extreme magnitude.
+        For the first field that breaks a rule, or is too large or too small to compute with. If there is no such field, but a
+        constant of the equations is not finite: for the field of the most extreme magnitude.
     """
 
     __slots__ = ()

@@ -229,7 +229,7 @@ class Plant:
         Raises
         ------
         InputError
-            If an input is not finite, or so large that an output is not finite, or if one is not finite whatever the inputs.
+            If an input is not finite, or so large that an output is not finite, or if an output is not finite at zero inputs.
         """
         self._check_inputs()
         i = self._applied_inputs()
@@ -355,7 +355,7 @@ class Plant:
 
     @classmethod
     def restore(cls, mechanism: Mechanism, saved: dict[str, Any]) -> Plant:
-        """Return the plant that `save` described by ``saved``.
+        """Return a plant in the state ``saved``, which `save` has returned.
 
         Raises
         ------

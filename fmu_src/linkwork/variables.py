@@ -48,7 +48,7 @@ UNITS = {
 }
 
 
-#: Roles of variables: their causality, and what they are.
+#: Roles of variables, by name: the causality of a variable with this role, and the meaning of the role.
 ROLES = {
     "stiffness": ("parameter", "stiffness of a spring along a coordinate"),
     "damping": ("parameter", "viscous damping along a coordinate"),
@@ -164,7 +164,7 @@ def choice(name: str, description: str, start: int, least: int, greatest: int) -
 
 
 def crank_start(angle: str, speed: float, replaced: str) -> tuple[Variable, Variable]:
-    """Return the parameters of the crank's angle and speed at the start; ``replaced`` says when drive.speed replaces it."""
+    """Return the parameters of the crank's angle and speed at the start; ``replaced`` says when drive.speed is used."""
     text = f"Crank speed at the start; replaced by drive.speed {replaced}"
     return (
         Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", angle, display="deg"),
@@ -207,7 +207,10 @@ def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Vari
 
 
 def closure_outputs(transmission: str, greatest: float) -> tuple[Variable, Variable]:
-    """Return the outputs of the closure's residual and of the transmission angle, described by ``transmission``, in rad."""
+    """Return the outputs of the closure's residual and of the transmission angle.
+
+    ``transmission`` is the description of this angle, ``greatest`` its greatest value (rad).
+    """
     text = "Length by which the loop fails to close"
     angle: dict[str, Any] = {"minimum": 0.0, "maximum": greatest, "display": "deg", "role": "transmission"}
     return (

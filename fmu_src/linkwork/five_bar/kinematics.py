@@ -78,7 +78,7 @@ def position(th2: float, u: float, p: Constants) -> Position:
 def close_loop(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
     """Return the position with C at the intersection of the circles about B and D, for the vector (dx, dy) from B to D.
 
-    The crank's direction ``c2, s2`` is passed through. The caller decides what moves D: in `position` it is the slider.
+    The crank's direction ``c2, s2`` is returned unchanged. D may be a point of any body; in `position` it is the slider pin.
     """
     d2 = dx * dx + dy * dy
     a = 0.5 * (d2 + l3 * l3 - l4 * l4)
