@@ -200,7 +200,7 @@ def coexistence(
 
 
 def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArray:
-    """Compute the motions at the m points of each row, shape (rows, m, MOST_ORBITS, n + 2).
+    """Compute the motions at the m points of each row, shape (rows, m, MOST_ORBITS, n + 3).
 
     ``guesses`` are guesses of y, shape (count, n). The last axis has the largest multiplier, the amplitude, the index and the
     start. The motions of a point are sorted by amplitude; entries after the last motion are NaN.

@@ -189,7 +189,7 @@ class Drive:
         return self._with_coupled(mechanism, given)
 
     def _with_coupled(self, mechanism: Mechanism, given: dict[int, Fraction]) -> dict[int, Fraction]:
-        """Return the ratios ``given`` and those that follow from them and the crank through springs that couple rotations."""
+        """Return the ratios ``given`` and the ratios of rotations that springs couple to these rotations or to the crank."""
         if not any(freedom.coupled for freedom in mechanism.freedoms):
             return given
         turning, acting = {self.reference(mechanism).freedom: Fraction(1)} | given, {*self.forces, *self.motors}

@@ -131,7 +131,7 @@ class Turn:
 
     @property
     def amplitude(self) -> float:
-        """The first of the `amplitudes`."""
+        """The amplitude of the first of ``swings``."""
         return self.swing_amplitude(self.swings[0])
 
     @property

@@ -573,7 +573,7 @@ class _FoundMotions:
         self.orbits: list[PeriodicOrbit] = []
         #: Starts of all motions found, one for each turn of a motion; motions of shorter periods are included.
         self.known = np.empty((0, len(guess)))
-        #: See `Orbits`.
+        #: Sum of the indices of the motions found: see `Orbits.index`.
         self.index = 0
         #: Starts from which Newton's method without deflation failed.
         self.failed: list[FloatArray] = []

@@ -45,7 +45,7 @@ _BEGINNINGS = {
     Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),
 }
 #: A branch ends when the clearance to the limit of assembly (a sine, as `LIMIT_SINE`) falls below the first value, or when its
-#: largest multiplier exceeds the second.
+#: largest multiplier exceeds the second value.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 

@@ -273,14 +273,14 @@ class Variations:
         integrals = self.h[:, None, None] * _GAUSS.integrals
         matrix = np.eye(size) - np.einsum("kij,kjab->kiajb", integrals, self.by_y).reshape(k, size, size)
         inverse = np.linalg.inv(matrix)
-        #: matrices from r, and from d at the beginning, to d at the nodes
+        #: Matrices that give d at the nodes, from r and from d at the beginning of the panel.
         self._to_nodes = np.einsum("kxia,kij->kxja", inverse.reshape(k, size, _POINTS, n), integrals).reshape(
             k, size, size
         )
         self._from_start = inverse.reshape(k, size, _POINTS, n).sum(axis=2)
         weights = self.h[:, None] * _GAUSS.weights
         weighted = np.einsum("ki,kiab->kaib", weights, self.by_y).reshape(k, n, size)
-        #: matrices from r, and from d at the beginning, to d at the end
+        #: Matrices that give d at the end of the panel, from r and from d at the beginning.
         self._to_end = weighted @ self._to_nodes + np.einsum("ki,ab->kaib", weights, np.eye(n)).reshape(k, n, size)
         self.steps = np.eye(n) + weighted @ self._from_start
         starts = np.empty((k, n, n))

@@ -297,7 +297,10 @@ _BESIDE = {"": "BPC", "BC": "", "BP": "CP", "PC": "BP"}
 
 
 def _coupler_line(pins: Mapping[str, Point], least: float) -> str:
-    """Return the ends of the line that B, C and the coupler point lie on; empty if they span twice the area ``least`` (m2)."""
+    """Return the ends of the line on which B, C and the coupler point lie.
+
+    The result is empty if they lie on no line: if twice the area of their triangle is ``least`` (m2) or more.
+    """
     b, c, p = pins["B"], pins["C"], pins.get("P", pins["C"])
     if abs((c[0] - b[0]) * (p[1] - b[1]) - (c[1] - b[1]) * (p[0] - b[0])) >= least:
         return ""

@@ -44,7 +44,7 @@ CHUNK = 4096
 PINNED = 64
 #: Number of coupler curves of a chunk that are placed over the target: the most similar ones.
 PLACED = 160
-#: Number of crank steps of a coupler curve, and of its points at equal arc lengths.
+#: Number of crank steps of a coupler curve, and number of its points at equal arc lengths.
 CURVE, EVEN = 128, 64
 #: Pieces of a coupler curve for an open target: number of points at equal arc lengths, first steps, numbers of steps.
 PIECE = 24
