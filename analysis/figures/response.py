@@ -270,7 +270,7 @@ def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Lab
 
 
 def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
-    """Return whether a motion beside a special point is stable, so that a machine reaches it."""
+    """Return whether a motion beside a special point is stable, so that a machine can reach the point."""
     return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 

@@ -27,7 +27,7 @@ _STILL = 1e-9
 _ROUNDING = 1e-12
 #: Inches: width of a panel beside a picture of the mechanism, width without one, and height of a panel.
 _BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
-#: If a curve has more oscillations than this, a band is drawn instead; greatest number of its parts; note about it.
+#: If a curve has more oscillations than this, a band is drawn instead; greatest number of parts of the band; note about it.
 _FAST, _BANDS = 120, 200
 BANDS = "Band: range of an oscillation that is too fast to be drawn; its line is the mean."
 #: Range of many runs, relative to the range of 90 % of them, above which the axis is cut off.

@@ -87,7 +87,7 @@ def label_in_words(label: str) -> str:
 
 @contextmanager
 def figure_style(*, laid_out: bool = True) -> Iterator[None]:
-    """Use this style instead of the user's; without ``laid_out`` Matplotlib does not lay out the axes."""
+    """Use the style of this module instead of the user's; without ``laid_out`` Matplotlib does not lay out the axes."""
     with matplotlib.style.context(STYLE | {"figure.constrained_layout.use": laid_out}, after_reset=True):
         yield
 

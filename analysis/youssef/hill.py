@@ -34,8 +34,8 @@ STEP_BY_RATE = 0.5
 JUDGED = 64
 #: The default order of Hill's determinant is twice the order of the coefficients plus this number.
 MORE_HARMONICS = 16
-#: A boundary counts as real if its imaginary part is at most this times its magnitude, or times 1 if that is larger. Two
-#: boundaries that nearly coincide are accurate only to the square root of the rounding error.
+#: A boundary counts as real if its imaginary part is at most this times its magnitude, or at most this if the magnitude is
+#: below 1. Two boundaries that nearly coincide are accurate only to the square root of the rounding error.
 REAL = 1e-8
 
 

@@ -28,7 +28,7 @@ from .table import TWISTS_REACHED_DEG, Case
 
 #: Rows and columns of the entries 21, 31 and 32, the right sides of eqs 20.
 _BELOW = ([1, 2, 2], [0, 0, 1])
-#: Shifts (in) at which the iteration is tried, runs at each, and differences of their starts (rad, in).
+#: Shifts (in) at which the iteration is tried, number of runs at each shift, and scatter of their starts (rad, in).
 TRIED, RUNS, OFF = np.arange(0.0, 12.5, 0.5), 20, 1e-9
 #: Differential operator of a rotation about k, eqs 2a and 3a.
 _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])

@@ -84,7 +84,7 @@ def mechanism(case: Case) -> SliderCrankParameters:
 
 @cache
 def turn(case: Case) -> ForceTurn:
-    """Compute the forces over a turn of the crank under the given torque."""
+    """Compute the forces over a turn of the crank under the torque of 100 lb.in."""
     return force_turn(
         mechanism(case),
         crank_speed=CRANK_SPEED,
@@ -148,7 +148,7 @@ def nothing(label: str, size: ArrayLike, unit: str = "", *, why: str = "") -> Ju
 
 
 def _motion() -> tuple[Statement, ...]:
-    """Judge the shape and the stroke of the slider's motion, and its power."""
+    """Judge the shape and the stroke of the slider's motion, and the mean power at the crank."""
     shapes = []
     for case in (IDEAL, *ALL):
         first = 2.0 * np.fft.rfft(position(case)[:-1])[1] / (ANGLES_DEG.size - 1)

@@ -186,7 +186,7 @@ def replacements() -> list[Judged]:
 
 
 def _rounded(values: Named, kind: type[np.floating[Any]]) -> Named:
-    """Return the numbers of a named tuple in single precision, then as ``kind``."""
+    """Round the numbers of a named tuple to single precision; return them as numbers of the type ``kind``."""
     singles = (np.asarray(x, np.float32).astype(kind) for x in values)
     numbers: Any = [tuple(x) if isinstance(old, tuple) else x[()] for x, old in zip(singles, values)]
     return type(values)(*numbers)

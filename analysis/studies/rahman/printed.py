@@ -23,7 +23,7 @@ from ...units import INCH
 
 FloatArray = NDArray[np.float64]
 
-#: Step of the crank angle (deg) in the continuation, and most corrections at an angle: our choice.
+#: Step of the crank angle (deg) in the continuation, and greatest number of corrections at an angle: our choice.
 STEP_DEG, MAX_STEPS = 5.0, 200
 #: Largest change of an angle (rad) or of S4 (in) in a small step: our choice too.
 STEP = 1e-6
@@ -259,7 +259,7 @@ def separated_rates(c: Crank, q: Joints) -> FloatArray:
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
     """Return the residual of eq 37f (in/s) with erratum 2 mended, with joint rates that satisfy eqs 37a to 37e.
 
-    With the erratum mended, the rate of eta acts about the axis j after its rotation by theta.
+    With the erratum mended, the rate of eta acts about the axis j that the rotation by theta has turned.
     """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)

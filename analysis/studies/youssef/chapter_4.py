@@ -41,13 +41,13 @@ OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 INERTIA_RATIOS = (0.5, 1.0, 1.5)
 #: Variants of the equation that are compared, with their names in legends.
 VARIANTS = {Variant.EXACT: "corrected", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
-#: The speeds of appendix 2 (rad/s), closer at the resonances.
+#: The speeds of appendix 2 (rad/s), with smaller steps at the resonances.
 SPEEDS = np.unique(
     np.concatenate([np.arange(9.0, 40.05, 0.1), np.arange(15.0, 15.8, 0.005), np.arange(30.0, 31.3, 0.005)]).round(3)
 )
 #: Mask of the speeds outside the regions of resonance.
 APART = (np.abs(SPEEDS - 15.5) >= 1.0) & (np.abs(SPEEDS - 31.0) >= 2.0)
-#: omega_c = mu/(m4 + m5) (1/s) of appendix 2: it raises mu by 200 dyn.s/cm after each curve, and m4 + m5 is 1000 g.
+#: omega_c = mu/(m4 + m5) (1/s) of appendix 2, which raises mu by 200 dyn.s/cm after each curve; m4 + m5 is 1000 g.
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
 #: omega_c (1/s) at which second harmonics are compared: the thesis's value, which removes all instability.
 COMPARED_AT = 0.45

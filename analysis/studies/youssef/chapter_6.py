@@ -45,7 +45,7 @@ FloatArray = NDArray[np.float64]
 TRANSMISSION = 40.0
 #: Longer semi-axis of ellipse (a) (cm).
 LONGER_CM = 10.0
-#: A small search is enough: nearly every start of these problems ends at the same optimum.
+#: Settings of a small search, which is enough: nearly every start of these problems ends at the same optimum.
 SEARCH = Search(starts=4, candidates=1 << 14)
 #: Colours of the target, the printed linkage and our linkage.
 TARGET, PRINTED, FOUND = "0.25", COLOURS[1], COLOURS[0]
@@ -83,7 +83,7 @@ def our_error(name: str) -> float:
 
 #: Tolerance of a printed error, in words.
 HALF = "half a unit of the last digit"
-#: Our readings of the errors of the rocker functions.
+#: How we read the definition of the errors of the rocker functions, which the thesis gives incompletely.
 READING = (
     "(6.18) has no weights, and the number of crank angles is not printed. We try these readings: 18 to 360 angles in equal "
     "steps of whole or half degrees, with the end of the turn or without; the weighted errors added up and divided by 1000, "

@@ -61,8 +61,8 @@ def oscillator_differences(inertia_ratio: float) -> tuple[float, float]:
     """Compare the motion with that of a damped oscillator under a force that grows with the square of the speed.
 
     The oscillator has the mean values of M and K; its force is fitted to the first harmonic over all speeds. Returns the
-    greatest difference of the first harmonic from the oscillator's amplitude, relative to that amplitude, and the same for
-    the amplitude by both harmonics; each is the greater result of two dampers.
+    greatest difference of the first harmonic from the oscillator's amplitude, relative to the oscillator's amplitude,
+    and the same difference for the amplitude of both harmonics together. Each is the greater of the results for two dampers.
     """
     found, compared = slider_equation(chapter_4(inertia_ratio), 1.0), []
     for damper in (WEAK, STRONG):
@@ -105,7 +105,7 @@ def second_region_width(inertia_ratio: float) -> float:
 
 
 def judge_single_region() -> tuple[Case, Case]:
-    """Judge whether there is a region of instability near twice the natural frequency only."""
+    """Judge whether the only region of instability is near twice the natural frequency."""
     least = min(map(second_region_width, RATIOS))
     return (
         near("speed of the region over the natural frequency", 2.0, twice_natural(), 2.0 * ABOUT),

@@ -139,7 +139,7 @@ def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEq
 
 
 def judge_shifts() -> tuple[Case, ...]:
-    """Judge how the stated damper shifts regions 1 to 4 of (5.30) and changes their widths, for the I4 `COMPARED`."""
+    """Judge how the stated damper shifts regions 1 to 4 of (5.30) and changes their widths, for the I4 of `COMPARED`."""
     found: list[tuple[float, float, float]] = []
     for ratio in COMPARED:
         for n, free in hill_regions(equation_without_factor(ratio, 0.0), 4).items():
@@ -157,7 +157,10 @@ def judge_shifts() -> tuple[Case, ...]:
 
 
 def error_of_factor(inertia_ratio: float) -> float:
-    """Return the greatest error of the multipliers of (5.29) times the factor of (5.28), with the stated damper."""
+    """Return the greatest error of the multipliers by (5.28) and (5.29), with the stated damper.
+
+    The multipliers of (5.29), times the factor of (5.28), are compared with those of the whole equation.
+    """
     region = hill_region(chapter_4(inertia_ratio))
     found = slider_equation(chapter_4(inertia_ratio, STATED), crank_speed(0.5 * (region.low + region.high)))
     psi1 = divide_by_mass(found.homogeneous(), ALL_HARMONICS).b
@@ -182,7 +185,7 @@ def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
 
 
 def growth_outside_region(omega_c: float) -> float:
-    """Return the greatest real part s1 of Lambda (5.32) outside the first region, for the I4 `COMPARED` and a damper (1/s)."""
+    """Return the greatest real part s1 of Lambda (5.32) outside the first region, for a damper (1/s) and the I4 `COMPARED`."""
     sizes: list[float] = []
     for ratio in COMPARED:
         region = hill_region(chapter_4(ratio))

@@ -33,7 +33,7 @@ SMOOTH = 5
 LONG_STEP = 1e-2
 #: Why the closure does not show the error of a launch.
 KINK = "the step in which the torque of the launch ends leaves an error along the motion, while the loop stays closed"
-#: Step (s) with which appendix 1 begins: there the estimate of Hamming's method is judged.
+#: Step (s) with which appendix 1 begins; with this step the estimate of Hamming's method is judged.
 STEP = 1e-3
 #: Errors (m) with which this estimate is tested: of the start, and the unit to which the back values are rounded.
 START_ERROR, UNIT = 1e-5, 1e-6

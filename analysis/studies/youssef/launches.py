@@ -166,7 +166,10 @@ def _launch_result(
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
-    """Draw a quantity of several launches over time, with a circle at th2 = 1 rad, where the torque ends."""
+    """Draw a quantity of several launches over time, with a circle at th2 = 1 rad, where the torque ends.
+
+    ``values`` are the torques or springs of the launches, ``legend`` is the heading of the legend.
+    """
     time, *columns = result.columns.values()
     name = list(result.columns)[1]
     curves, circles = [], []

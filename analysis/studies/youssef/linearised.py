@@ -99,7 +99,7 @@ def elimination_residuals(sigma2: float) -> dict[str, float]:
 def residuals() -> dict[str, float]:
     """Return the greatest residual of each equation (4.10) to (4.20) in a motion of the plant, relative to the largest term.
 
-    The plant is Table 3.1 without gravity; its coupler has mass and its rocker is not balanced.
+    The plant is the mechanism of Table 3.1 without gravity, with a coupler that has mass and a rocker that is not balanced.
     """
     par, w = table_3_1(1e6, gravity=0.0), SPEED * RAD_S_PER_RPM
     p, worst = par.constants(), dict[str, float]()

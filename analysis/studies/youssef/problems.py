@@ -51,7 +51,7 @@ class PublishedProblem:
     bounds : mapping
         Bounds on the dimensions, as `synthesize` takes them.
     limits : tuple, optional
-        Constraints; see ``constraints`` for those of most problems.
+        Constraints; None for the constraints that the property ``constraints`` chooses by the kind of task.
     """
 
     task: syn.Task

@@ -144,7 +144,7 @@ def draw_rig_1(result: StudyResult) -> Figure:
 
 # --- rig-1-friction: what friction in proportion to the guide's force explains of figures 8.7 to 8.17
 
-#: Coefficients of friction in the guide of the plots.
+#: Coefficients of the guide's friction in the plots.
 COEFFICIENTS = (0.0, SLIGHT, 0.1, 0.15)
 #: Speeds (rpm) of the figures where theory and experiment are compared, and those of the turns shown.
 COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
@@ -162,9 +162,10 @@ def amplitude_decrease(coefficient: float) -> NDArray[np.float64]:
 
 
 def spread_beyond_constant(coefficient: float) -> float:
-    """Return the variation of the amplitude's decrease with the speed, divided by that with constant friction.
+    """Return the variation of the amplitude's decrease with the speed, relative to constant friction.
 
-    A variation is the greatest decrease over the least, in cm, with spring A at the speeds `COMPARED`. The constant friction
+    The variation is the greatest decrease divided by the least, with spring A at the speeds `COMPARED`; the result is the
+    variation with friction by a coefficient, divided by the variation with constant friction. The constant friction
     is the coefficient times the mean of the guide's force over these turns without friction.
     """
     constant = coefficient * float(np.mean([np.abs(turn("A", w)["slider.guide_force"]).mean() for w in COMPARED["A"]]))

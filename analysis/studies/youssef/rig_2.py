@@ -23,7 +23,7 @@ from . import rigs
 
 #: Natural frequencies (rpm) that the thesis sees and calculates, as printed, by spring.
 NATURAL = {"C": ("585", "582"), "D": ("825", "829")}
-#: Speeds (rpm) of the linear equation, and those that were run.
+#: Speeds (rpm) at which the linear equation is solved, and speeds at which the rig was run.
 CURVE = np.arange(rigs.SLOWEST, rigs.FASTEST["C"] + 1.0, 10.0)
 RANGE = np.arange(300.0, 1001.0, 10.0).tolist()
 #: Speeds (rpm) beyond resonance, by spring, at which the amplitude is compared, and dampers relative to the rig's.

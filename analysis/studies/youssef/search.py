@@ -35,18 +35,19 @@ LOW = np.array([-20.0, -20.0, 10.0, 0.1, 10.0, 10.0, 0.0, -pi, -pi, -pi])
 HIGH = np.array([60.0, 60.0, 30.0, 10.0, 30.0, 30.0, 30.0, pi, pi, pi])
 #: Relative difference at which the search stops, the program's (L8962), and evaluations at which it is given up.
 EPS, MOST = 1e-2, 4000
-#: Searches of each kind; known minima that a new search includes; points, and indices of the parameters X0, Y0, l2, a1, th20,
-#: with which a search begins.
+#: Number of searches of each kind; number of known minima that a new search includes; number of points with which some searches
+#: begin; indices of the parameters X0, Y0, l2, a1, th20 with which other searches begin.
 SEARCHES, INCLUDED, FEWER_POINTS, FEWER = 20, 4, 12, [0, 1, 3, 7, 8]
-#: Half of the points, with which a search begins instead.
+#: Number of points, half of all, with which further searches begin.
 HALF = N // 2
-#: Indices of all parameters but a2, with which a search begins instead.
+#: Indices of all parameters but a2, with which further searches begin.
 NINE = list(range(9))
 #: Searches of each kind whose errors and evaluations are compared by rank: twenty are too few to show a difference.
 RANKED = 100
 #: Bounds of a descent to a minimum: those of the search, but none of the angles, which are periodic.
 FREE_LOW, FREE_HIGH = (np.append(bounds[:7], np.full(3, end)) for bounds, end in ((LOW, -np.inf), (HIGH, np.inf)))
-#: Random sets from which descents begin, difference of two minima (cm2), and numbers of points at which they are counted.
+#: Number of random sets from which descents begin; least difference of two minima (cm2); numbers of points for which the minima
+#: are counted.
 DESCENTS, APART, COUNTED = 40, 0.1, (5, FEWER_POINTS, N)
 #: Random sets by (6.11), and probability below which a difference is not taken for chance.
 SETS, CHANCE = 2000, 0.05

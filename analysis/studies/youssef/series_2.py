@@ -84,8 +84,8 @@ def rocker_motion(harmonics: int) -> Solution:
 def path_motion(harmonics: int) -> Solution:
     """Return the best slider motion with a number of harmonics for path (b), with the printed links.
 
-    The guide is turned by 0 to 90 deg from the ground link. With two harmonics, longer strokes than the limit, more than ten
-    times the printed one, reach less.
+    The guide is turned by 0 to 90 deg from the ground link. With two harmonics, strokes longer than the limit give no
+    better motion; the limit is more than ten times the printed stroke.
     """
     p = PROBLEMS[PATH]
     starts, stroke = PATH_SEARCHES[harmonics]
