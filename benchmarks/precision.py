@@ -128,7 +128,7 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
 def costs(most: int) -> list[tuple[int, float, float]]:
     """Measure ensembles of up to ``most`` runs.
 
-    Returns a row for each: number of runs, and time per run divided by that of one run alone, with and without lanes.
+    Returns a row for each ensemble: number of runs, and time per run over the time of one run alone, with and without lanes.
     """
     speed = SETS["table-3.1"].crank_speed
     settings = {"stop_time": 0.1, "step": 1e-2}

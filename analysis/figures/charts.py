@@ -27,7 +27,7 @@ EMPTY = "0.82"
 _HATCHES, _UNSTABLE = ("", "//", "xx", "..", "--", "||"), "////"
 #: Size of a chart of a result (inches).
 _SIZE = 7.2, 4.6
-#: Classes of points by the number of stable motions, with their colours; class numbers for none, one and several of them.
+#: Classes of points by the number of stable motions, with their colours; class numbers for no, one and several stable motions.
 _SEVERAL = {"one stable motion": "#C6DFF0", "several stable motions": "#F6C99F", "unstable motions only": "#E58267"}
 _BY_COUNT = np.array([2.0, 0.0, 1.0])
 #: Legend entries of initial conditions that settle to no known motion, by the number that marks them in `Basins.ends`.

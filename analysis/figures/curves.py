@@ -88,7 +88,7 @@ class Panel:
     x_label, y_label : str
         With units.
     curves : sequence of Curve
-        Curves without a colour of their own get those of `COLOURS` in order.
+        Curves without a colour of their own get the colours of `COLOURS` in order.
     verticals : mapping
         Places along x of dotted vertical lines, by name; the names are written where they cover as little as possible.
     dashed : sequence of float

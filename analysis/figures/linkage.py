@@ -72,7 +72,7 @@ class _Scene:
     ) -> None:
         self.parameters, self.letter = parameters, letter
         k = parameters.constants()
-        #: Length by which pins, supports and letters are drawn.
+        #: Length that scales pins, supports and letters.
         self.unit = CM_PER_METRE * (k.l1 + k.l3 + k.l4) / 45.0
         self.along = np.array([k.ca, k.sa])
         self.left = np.array([-k.sa, k.ca])

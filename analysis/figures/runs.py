@@ -199,7 +199,7 @@ def is_fast(values: FloatArray) -> bool:
 
 
 def _oscillations(values: FloatArray) -> int:
-    """Count those oscillations of a curve whose height is at least about a twentieth of the curve's range."""
+    """Count the oscillations of a curve; an oscillation lower than about a twentieth of the curve's range is ignored."""
     size = float(np.ptp(values)) if len(values) else 0.0
     if not size > 0.0:
         return 0

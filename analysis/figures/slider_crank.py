@@ -25,9 +25,9 @@ from .dispatch import plot
 FloatArray = NDArray[np.float64]
 
 _LINEAR, _SAMPLES, _SECOND, _WORST = style.COLOURS[0], style.COLOURS[1], style.COLOURS[2], "0.45"
-#: If greatest/median error over the turn is above the first number, the axis is cut at the second number times the median.
+#: If the greatest error over the turn is above the first number times the median, the axis ends at the second number times it.
 _PEAK, _CUT = 12.0, 4.0
-#: If the shares to second order differ by less than this from those to first order, they are not drawn.
+#: Shares to second order are not drawn if they differ by less than this from the shares to first order.
 _SAME_SHARE = 0.02
 #: A curve is zero below this share of the largest value with the same unit.
 _ZERO = 1e-12

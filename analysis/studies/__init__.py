@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 #: All figures of both theses by number, in order, including those that only show a mechanism or an apparatus.
 ENTRIES: Mapping[str, Entry] = MappingProxyType({**_YOUSSEF, **_RAHMAN})
 
-#: Title of each study by its number; that of a figure of Rahman's has an R before it.
+#: Title of each study by its number; the numbers of Rahman's figures begin with R.
 STUDIES: Mapping[str, str] = MappingProxyType(
     {number: entry.title for number, entry in ENTRIES.items() if entry.module}
 )
 
 
 def is_figure(number: str) -> bool:
-    """Return whether the number is that of a figure of a thesis; our own studies have names instead."""
+    """Return whether ``number`` belongs to a figure of a thesis; our own studies have names instead."""
     return number.removeprefix("R")[0].isdigit()
 
 

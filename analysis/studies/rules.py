@@ -9,7 +9,7 @@ ABOUT = 0.15
 ABOUT_DEG = 10.0
 #: "Slightly", "a little": a change by no more than this, relative to what changes, and by more than `ALIKE`.
 SLIGHTLY = 0.15
-#: "Small", "negligible", "insignificant": no more than this, relative to what it is compared with.
+#: "Small", "negligible", "insignificant": no more than this, relative to the quantity that it is compared with.
 SMALL = 0.05
 #: "The same", "constant", "linear", "straight", "steady": a difference that cannot be seen on a graph, relative to its scale.
 ALIKE = 0.05

@@ -377,7 +377,7 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
 
     The two boundaries are a complex pair if damping has removed the region.
 
-    On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
+    On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 matter. To
     second order the other harmonics q subtract the sum of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), in
     which lambda is the solution for constant coefficients equal to the means.
     """

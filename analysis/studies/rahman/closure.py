@@ -122,7 +122,7 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
 
 
 def _independent() -> tuple[int, float]:
-    """Return the number of independent equations in 19a, and the order to which the dependent equations agree with them.
+    """Return the number of independent equations in 19a, and the order to which the other equations agree with them.
 
     The number is the rank of the left sides in a general position. Left sides on opposite sides of the diagonal add up to
     zero, so their right sides should too. The order is the power of the opening (rad, in) with which these sums of right sides
@@ -140,7 +140,7 @@ def _independent() -> tuple[int, float]:
 
 
 def _joint_freedoms() -> tuple[tuple[int, int], ...]:
-    """Return the rotations and translations of each joint 1 to 4 by eqs 1 to 4.
+    """Return the numbers of rotations and of translations of each joint 1 to 4 by eqs 1 to 4.
 
     The rank of the derivatives of a joint's matrix is the number of rotations and translations together; the rank of their
     real parts is the number of rotations.

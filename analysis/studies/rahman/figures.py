@@ -65,7 +65,7 @@ NOTHING = 1e-6
 ROUNDING = f"{NOTHING:g}, for rounding errors"
 #: Distance from a dead centre at which greatest values are taken, in words.
 FROM_DEAD = f"{CLEAR_DEG:g} deg or more from a dead centre"
-#: Torque on the crank (lb.in) and its length (in).
+#: Torque on the crank (lb.in), and length of the crank (in).
 TORQUE, CRANK = 100.0, 12.0
 #: Ratio by which the values beside a spike exceed all values clear of the dead centres.
 SPIKE = 2.0

@@ -146,8 +146,8 @@ def _clear_joints(case: Case) -> Joints:
 def velocity_paths() -> list[Judged]:
     """Compare the momenta of rod and slider by eqs 50a and 51a with those by eqs 52a and 53a, in the plane and out of it.
 
-    The first two take the velocities from the joints on the crank's side (the thesis's forward path), the others from those on
-    the slider's side (its mixed path).
+    Eqs 50a and 51a take the velocities from the joints on the crank's side (the forward path of the thesis), eqs 52a and 53a
+    from the joints on the slider's side (the mixed path).
     """
     b, found = bodies(parameters()), []
     for case in (PLANE, *ROW_F):

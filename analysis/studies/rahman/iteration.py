@@ -30,7 +30,7 @@ def _detection_errors() -> tuple[float, float]:
 
     The crank turns fully at all of these shifts. They increase from 0 to the greatest such shift in steps of 2 in, at a4 = 0,
     10, 20 and 30 in. The iteration runs round the turn as in `turn`. It fails if it does not converge at one of the angles.
-    It accepts an open loop if it converges at all of them and the loop is open at one.
+    It accepts an open loop if it converges at all angles and the loop is open at one of them.
     """
     missed: list[bool] = []
     wrong: list[bool] = []

@@ -278,7 +278,7 @@ def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q
 class Bodies(NamedTuple):
     """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), squared radii of gyration.
 
-    The radii (in2) are K1z2 of the crank, and those about x, y and z of rod and slider.
+    The squared radii (in2) are K1z2 of the crank, and the squared radii about x, y and z of rod and slider.
     """
 
     masses: tuple[float, ...]
@@ -329,7 +329,7 @@ def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
 
 
 def _forward_rod_rate(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
-    """Return the rate of eq 35; eqs 55 and 56 share its terms."""
+    """Return the rate of the rod's dual velocity by eq 35; eqs 55 and 56 share its terms."""
     (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
     w, v, wt, vt = c.speed, c.shift_rate, c.acceleration, c.shift_acceleration
     about_j2 = a.eta2 * c2 - r.eta2 * r.th2 * s2
@@ -358,7 +358,7 @@ def _forward_rod_rate(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
 
 
 def _slider_rotation(q: Joints) -> FloatArray:
-    """Return the rotation matrix of eq 45 from frame 3 to frame 4, the transpose of that of eq 3."""
+    """Return the rotation matrix of eq 45 from frame 3 to frame 4, the transpose of the matrix of eq 3."""
     (s3, sh), (c3, ch) = np.sin([q.th3, q.eta3]), np.cos([q.th3, q.eta3])
     return np.array([[c3 * ch, s3 * ch, -sh], [c3 * sh, s3 * sh, ch], [s3, -c3, 0.0 * s3]])
 

@@ -310,7 +310,7 @@ def relative_deviation(found: TrackingResult) -> float:
 
 
 def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
-    """Judge the statements on drives with feedback and on those that adapt (7.1.2 to 7.3.1), given a run with feedback."""
+    """Judge the statements on drives with feedback and on adaptive drives (7.1.2 to 7.3.1), given a run with feedback."""
     at_rest, least = search_on_machine()
     changes = ((CHANGED, SPEED), (LOAD, 0.5 * SPEED), (LOAD, 2.0 * SPEED))
     before = error_on_machine(machine().motion)

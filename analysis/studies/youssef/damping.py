@@ -46,7 +46,7 @@ RANGE = (0.0, 1.2)
 #: Crank angles at which the coefficients are divided, and number of harmonics that represents the quotients fully.
 ANGLES = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
 ALL_HARMONICS = 64
-#: Harmonics of the coefficients in (4.29) and in the listing of appendix 4.
+#: Number of harmonics of the coefficients in (4.29) and in the listing of appendix 4.
 LISTED_HARMONICS = 2
 #: I4 at which the removing damper is computed.
 RATIOS = np.linspace(0.25, 2.0, 8)

@@ -239,7 +239,7 @@ def closure_error(q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def evaluations_a_step() -> float:
-    """Count the evaluations of the accelerations in one step of Hamming's method; those of the starting steps do not count."""
+    """Count the evaluations of the accelerations in one step of Hamming's method, without the starting steps."""
     counts = []
     for stop in (0.4, 0.5):
         found = _by_hamming(slider_derivatives, [0.0, 0.0], 1e-3, stop)

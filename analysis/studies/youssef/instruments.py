@@ -26,7 +26,7 @@ PULSED = 420.0
 def crank_speed(inertia: float) -> NDArray[np.float64]:
     """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
 
-    The torque that the links need is that of the steady motion at `PULSED` rpm.
+    The torque that the links need is taken from the steady motion at `PULSED` rpm.
     """
     torque = turn("A", PULSED)["drive.applied_torque"]
     angle = np.linspace(0.0, 2.0 * pi, len(torque) + 1)

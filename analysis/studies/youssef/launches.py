@@ -37,7 +37,7 @@ from .runs import (
     table_3_1,
 )
 
-#: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
+#: Torques of Fig 3.6 to 3.8, and torques along the curve of Fig 3.7 (dyn.cm).
 TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Speeds (rpm), by spring (dyn/cm), at which a steadily running crank is released for comparison: above those of the launches.

@@ -29,7 +29,7 @@ DEG2_PER_RAD2 = degrees(1.0) ** 2
 WEIGHT = 1000.0
 #: Numbers of crank angles for timed paths and the rocker function, and for the weighted one. N is printed for the paths only.
 N, WEIGHTED_N = 72, 24
-#: Points of an ellipse and of a coupler curve for the area between them.
+#: Number of points of an ellipse and of a coupler curve for the area between them.
 AREA_N = 360
 
 
@@ -137,7 +137,7 @@ def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False, e
 
 
 #: The ten points of the packaging machine (appendix 5), offset by (51, 350) cm; 160 and the x of (0, 31) are uncertain in the
-#: scan. The first of them lie on y = 0, the straight part.
+#: scan. The first points lie on y = 0, the straight part.
 PACKAGING_POINTS_CM = (
     (164.0, 8.0),
     (164.0, 0.0),

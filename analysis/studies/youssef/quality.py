@@ -94,7 +94,7 @@ def least_combined(start: Linkage) -> Linkage:
 
 
 def descent_ratio(name: str) -> float:
-    """Return the error of the printed linkage, relative to that at the end of a descent from it.
+    """Return the error of the printed linkage, relative to the error at the end of a descent from it.
 
     A rocker function is taken as in `AS_FOUND`.
     """

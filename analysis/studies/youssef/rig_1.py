@@ -146,7 +146,7 @@ def draw_rig_1(result: StudyResult) -> Figure:
 
 #: Coefficients of the guide's friction in the plots.
 COEFFICIENTS = (0.0, SLIGHT, 0.1, 0.15)
-#: Speeds (rpm) of the figures where theory and experiment are compared, and those of the turns shown.
+#: Speeds (rpm) of the figures where theory and experiment are compared, and speeds of the turns shown.
 COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
 SHOWN = {"A": 420.0, "B": 660.0}
 

@@ -174,7 +174,7 @@ def maximum_near_fraction(spring: str, order: int) -> tuple[float, float]:
 def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
     """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the minimum that follows.
 
-    ``stiffness`` is that of the spring (N/m).
+    ``stiffness`` is the spring's stiffness (N/m).
     """
     place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
     found = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)

@@ -123,7 +123,7 @@ def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
 
 
 def greatest_ratio(values: NDArray[np.float64]) -> float:
-    """Return the greatest ratio of a value to its predecessor; raise an InputError if there is only one, or none."""
+    """Return the greatest ratio of a value to its predecessor; raise an InputError for fewer than two values."""
     if len(values) < 2:
         raise InputError(
             f"{format_count(len(values), 'turn')} to compare: there must be at least 2; change the parameters less"

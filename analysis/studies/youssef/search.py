@@ -33,7 +33,7 @@ PROBLEM = "ellipse-a-bounded"
 #: Bounds of X0, Y0, l1 to l4, r (cm), a1, th20, a2 (rad).
 LOW = np.array([-20.0, -20.0, 10.0, 0.1, 10.0, 10.0, 0.0, -pi, -pi, -pi])
 HIGH = np.array([60.0, 60.0, 30.0, 10.0, 30.0, 30.0, 30.0, pi, pi, pi])
-#: Relative difference at which the search stops, the program's (L8962), and evaluations at which it is given up.
+#: Relative difference at which a search stops, from the program (L8962); number of evaluations at which a search is given up.
 EPS, MOST = 1e-2, 4000
 #: Number of searches of each kind; number of known minima that a new search includes; number of points with which some searches
 #: begin; indices of the parameters X0, Y0, l2, a1, th20 with which other searches begin.
@@ -44,7 +44,7 @@ HALF = N // 2
 NINE = list(range(9))
 #: Searches of each kind whose errors and evaluations are compared by rank: twenty are too few to show a difference.
 RANKED = 100
-#: Bounds of a descent to a minimum: those of the search, but none of the angles, which are periodic.
+#: Bounds of a descent to a minimum: the bounds of the search, but without the angles, which are periodic.
 FREE_LOW, FREE_HIGH = (np.append(bounds[:7], np.full(3, end)) for bounds, end in ((LOW, -np.inf), (HIGH, np.inf)))
 #: Number of random sets from which descents begin; least difference of two minima (cm2); numbers of points for which the minima
 #: are counted.
@@ -296,7 +296,7 @@ def reaches_best(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: 
 
 
 def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ...]:
-    """Judge what the searches locate, and whether located minima help a fresh search."""
+    """Judge the statements on the minima that searches locate, and whether known minima help a new search."""
     plain = found[PLAIN]
     ends, bottoms = np.array([end.error for end in plain]), np.array([minimum_error(end) for end in plain])
     fewer = mannwhitneyu(
