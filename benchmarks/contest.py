@@ -358,7 +358,7 @@ def search_with_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) 
 
 
 def search_with_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run pylinkage's Nelder-Mead from the best of as many random linkages as our simplex takes, with default settings."""
+    """Run pylinkage's Nelder-Mead with default settings from the best of `DRAWS` random linkages, as our simplex does."""
     from pylinkage.optimization import minimize_linkage
 
     score = PylinkageScore(trace.contest, box)

@@ -13,7 +13,7 @@ from .dispatch import plot
 from .runs import display_unit
 from .style import Figure, name_in_words
 
-#: Samples of a period.
+#: Number of samples in a period.
 _SAMPLES = 512
 
 

@@ -31,7 +31,7 @@ _PEAK, _CUT = 12.0, 4.0
 _SAME_SHARE = 0.02
 #: A curve is zero below this share of the largest value with the same unit.
 _ZERO = 1e-12
-#: Letters in a line of the notes at the foot.
+#: Greatest number of letters in a line of the notes at the foot.
 _LETTERS = 140
 
 

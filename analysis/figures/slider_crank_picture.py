@@ -44,7 +44,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / INCH}
 #: Elevation and azimuth (deg) from which shift, offset and twist are visible, with the slider to the right of the crank.
 VIEW = (22.0, -112.0)
-#: Crank angles of a full turn at which paths and curves are computed.
+#: Number of crank angles of a full turn at which paths and curves are computed.
 _POINTS = 361
 #: Distance of the first and last drawn angle from the ends of a range (rad): rounding could make a square root negative there.
 _INSET = 1e-6

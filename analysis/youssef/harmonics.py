@@ -29,7 +29,7 @@ from .linearisation import NO_LOAD, Balance, Load, SliderEquation, Variant, bala
 
 #: Orders that the nonlinear balance tries in turn by default.
 ORDERS = (8, 16, 32, 64, 128, 256)
-#: Samples of a turn per harmonic of the nonlinear balance.
+#: Number of samples in a turn for each harmonic of the nonlinear balance.
 SAMPLES_PER_HARMONIC = 8
 #: Greatest numbers of Newton steps and of halvings of a step.
 MOST_ITERATIONS, MOST_HALVINGS = 40, 12

@@ -26,7 +26,7 @@ from ..numerics.fourier import FourierSeries
 from ..numerics.gauss import gauss
 from ..periodic import liouville, require_sign
 
-#: Gauss points of a step: the method is of order 12.
+#: Number of Gauss points of a step: the method is of order 12.
 STAGES = 6
 #: Greatest product of step (rad) and rate of the equation (1/rad) for which the error over a period is only rounding.
 STEP_BY_RATE = 0.5

@@ -36,9 +36,9 @@ from ..run import takes_published
 from ..units import Amount, in_si
 from .premises import require_five_bar
 
-#: Cells across the area in the coarsest and in the finest grid.
+#: Number of cells across the area in the coarsest and in the finest grid.
 COARSEST, FINEST = 128, 4096
-#: Halvings of a cell's edge to locate the boundary on the edge.
+#: Number of halvings of a cell's edge to locate the boundary on the edge.
 BISECTIONS = 40
 #: A grid is fine enough if at most this share of the sampled configurations lies outside the boundaries.
 MISSED = 0.01

@@ -59,7 +59,7 @@ PERIOD, BANDWIDTH, TURNS = 1e-3, 120.0, 3.0
 LOAD = (-5.0, -3.0)
 #: Load (N) of changed operating conditions: three times `LOAD`.
 CHANGED = (-15.0, -9.0)
-#: Trial cycles, and harmonics of the deviation that they correct.
+#: Number of trial cycles, and numbers of harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 6, (8, 16)
 #: First step (m) of a search on the machine, and number of runs in it.
 STEP, SEARCHED = 8e-3, 25

@@ -39,7 +39,7 @@ from .runs import ALIKE_WORDS, SIGN
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
 STATED = 0.45
-#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
+#: Range of the chart over lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
 BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
 DAMPERS = (0.0, 0.05, 0.1, 0.15)
 RANGE = (0.0, 1.2)

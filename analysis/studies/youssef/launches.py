@@ -226,7 +226,7 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
-    """Judge whether the speed of a free crank oscillates within each turn and its mean falls from turn to turn."""
+    """Judge whether the speed of a free crank oscillates in each turn, and whether the mean speed falls from turn to turn."""
     turns = [Turns.from_run(run, start) for run in runs.values()]
     return (
         at_least("range over the mean in a turn, least", ALIKE, min((t.speed_range / t.speed).min() for t in turns)),

@@ -21,12 +21,12 @@ from .runs import ALIKE_WORDS, PERIOD, SIGN, SPEED, TURNS, plain, scientific, ta
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
 #: Sine |sin(th4 - th3)| of the transmission angle below which coupler and rocker count as collinear: our choice.
 COLLINEAR_SINE = 0.3
-#: Turns of a run without a spring.
+#: Number of turns of a run without a spring.
 DRIFT_TURNS = 80
 SAMPLES_PER_DRIFT_TURN = 120
 #: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
-#: Turns of the transient according to the thesis, and the last turn of those over which the drift is compared with a line.
+#: Number of turns of the transient according to the thesis, and last of the turns over which the drift is compared with a line.
 TRANSIENT_TURNS, DRAWN_TURNS = 2, 10
 #: Least number of turns that shows the motion after the transient: two turns more than the transient.
 FEWEST_TURNS = TRANSIENT_TURNS + 2

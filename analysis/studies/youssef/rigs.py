@@ -51,7 +51,7 @@ FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
 GRID = {"A": np.arange(150.0, 521.0, 5.0), "B": np.arange(250.0, 821.0, 5.0)}
 #: Half a unit of the last digit of the printed stiffness (N/m): 3, 11, 4 and 8 times 10^6 dyn/cm.
 HALF_DIGIT = 500.0
-#: Samples of a turn.
+#: Number of samples in a turn.
 SAMPLES = 1440
 #: Greatest steps of the continuation relative to the range of speeds: fine enough to resolve the resonance of the third
 #: harmonic, and coarse where the resonance itself shortens the steps.

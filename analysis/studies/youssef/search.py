@@ -42,14 +42,14 @@ SEARCHES, INCLUDED, FEWER_POINTS, FEWER = 20, 4, 12, [0, 1, 3, 7, 8]
 HALF = N // 2
 #: Indices of all parameters but a2, with which further searches begin.
 NINE = list(range(9))
-#: Searches of each kind whose errors and evaluations are compared by rank: twenty are too few to show a difference.
+#: Number of searches of each kind whose errors and evaluations are compared by rank: twenty are too few to show a difference.
 RANKED = 100
 #: Bounds of a descent to a minimum: the bounds of the search, but without the angles, which are periodic.
 FREE_LOW, FREE_HIGH = (np.append(bounds[:7], np.full(3, end)) for bounds, end in ((LOW, -np.inf), (HIGH, np.inf)))
 #: Number of random sets from which descents begin; least difference of two minima (cm2); numbers of points for which the minima
 #: are counted.
 DESCENTS, APART, COUNTED = 40, 0.1, (5, FEWER_POINTS, N)
-#: Random sets by (6.11), and probability below which a difference is not taken for chance.
+#: Number of random sets by (6.11), and probability below which a difference is not taken for chance.
 SETS, CHANCE = 2000, 0.05
 #: Kinds of searches: from random sets, and with minima already located among the sets.
 PLAIN, KNOWN = "random sets", "with known minima"
@@ -249,7 +249,7 @@ def minimum_error(found: Found) -> float:
 
 @cache
 def minima(n: int) -> FloatArray:
-    """Return the errors of the minima to which descents from random sets lead with n points, if more than `APART` apart."""
+    """Return the errors of the minima that descents from random sets reach with n points; minima within `APART` count once."""
     random = np.random.default_rng(612)
     ends = [descend(v, side, n) for v in (draw_set(random) for _ in range(DESCENTS)) for side in (0, 1)]
     errors = np.sort([error * N / n for v, error in ends if closes(v)])
