@@ -130,7 +130,7 @@ def settle(figure: Figure) -> Figure:
 
 
 def _thin_ticks(axis: Axes) -> None:
-    """Leave out every other tick of fixed ticks until their numbers do not touch."""
+    """Remove every other tick from an x axis with given ticks, repeatedly, until the numbers do not touch."""
     while isinstance(axis.xaxis.get_major_locator(), FixedLocator) and len(axis.get_xticks()) > 3:
         boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
         if all(right.x0 - left.x1 > _GAP for left, right in pairwise(boxes)):

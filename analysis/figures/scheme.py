@@ -129,8 +129,9 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
 def _draw_suspension(axis: Axes, kind: str, paths: Sequence[Array], unit: float, side: float) -> None:
     """Draw a spring or damper from a block to a wall that the block does not reach.
 
-    ``paths`` are the positions (mm) of the block and of two points in its direction at all configurations. ``side``
-    times ``unit`` is the distance of a spring to the left of the block's line of motion, and of a damper to the right of it.
+    ``paths`` are the positions (mm), at all configurations, of the block and of two points; the wall lies in the direction
+    from the first point to the second. ``side`` times ``unit`` is the distance of a spring to the left of the block's line
+    of motion, and of a damper to the right of it.
     """
     block, start, end = (path[0] for path in paths)
     along = (end - start) / np.linalg.norm(end - start)

@@ -127,9 +127,10 @@ def natural_modes(
         Parameters of a mechanism, or a published set or its name. Dry friction is left out: it would hold all
         bodies at rest.
     inputs : Inputs, optional
-        Constant inputs of the motion. Degrees of freedom with a commanded rate are held; cranks among them pass through the
-        positions of their common period. If no crank is commanded, the first one is held, and its torque is left out. Every
-        crank under a motor is held too, and turns with the other cranks in the ratio of the speeds in ``initial``.
+        Constant inputs of the motion. Degrees of freedom with a commanded rate are held: a crank at evenly spaced positions
+        of the common period of all held cranks, any other at its initial position. If no crank is commanded, the first one
+        is held, and its torque is left out. Every crank under a motor is held, too; from one position to the next it turns
+        with the other cranks in the ratio of the speeds in ``initial``.
     initial : initial state, optional
         Position of the held degrees of freedom at the beginning, and guess of the equilibrium there.
     samples : int

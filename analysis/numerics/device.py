@@ -1,7 +1,7 @@
 """Compile kernels together with the equations of a mechanism for graphics processors (CUDA).
 
-A kernel for a device is a Numba function f(i, table). The number of a thread is i. The table of integers has numbers and the
-addresses of arrays, as `pack` writes them; a function of `reader` reads the kernel's arguments from it.
+A kernel for a device is a Numba function f(i, table). The number of the thread is i. The table holds the kernel's arguments
+as integers: numbers, and the addresses of arrays. `pack` writes the table; the function that `reader` returns reads it.
 
 Numba's code of the kernel, before LLVM optimises it, is linked with the equations, which are written for one lane without
 calls of the C library (`lanes`), since a device has none. LLVM compiles both together. The arithmetic is that of IEEE 754 on
@@ -97,7 +97,7 @@ def _make_array(context: Any, builder: Any, kind: Any, address: Any, shape: Sequ
 
 
 def pack(kind: Any, value: Any, place: Callable[[NDArray[Any]], int]) -> list[int]:
-    """Return the table from which a function of `reader` reads ``value``; ``place`` returns the address of an array."""
+    """Return the table from which the function of `reader` reads ``value``; ``place`` returns the address of an array."""
     if isinstance(kind, types.BaseTuple):
         return [word for k, v in zip(kind.types, value, strict=True) for word in pack(k, v, place)]
     if isinstance(kind, types.Array):

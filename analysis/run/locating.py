@@ -109,7 +109,9 @@ def _locate(e, low, high, h, motion):
 
 @inner
 def _events_of_step(what, cut, h, motion):
-    """Record the user's events inside a step; return the first event that ends the step, and its fraction of the step.
+    """Record the user's events inside a step; return the first event that ends the step, and its time.
+
+    Times are fractions of the step.
 
     If no event of the user ends the step earlier, it ends with the event ``what`` at the fraction ``cut`` of the step.
     """
@@ -148,7 +150,10 @@ def _make_interpolant(h, motion):
 
 @inner
 def locate_events(clearance, h, motion):
-    """Record the events in an accepted step; return the event that ends the step, or NOTHING, and its fraction of the step."""
+    """Record the events in an accepted step; return the event that ends the step, and its time as a fraction of the step.
+
+    If no event ends the step, these are NOTHING and 2.
+    """
     carry, watch = motion.carry, motion.watch
     _make_interpolant(h, motion)
     what, cut = NOTHING, 2.0

@@ -233,7 +233,10 @@ def instant(turn: ForceTurn, at: Any) -> Instant:
 
 
 def nominal_values(turn: ForceTurn) -> dict[str, float]:
-    """Return the parameters by field name, with amplitude and ratio of the groove that makes the shift."""
+    """Return the parameters by field name.
+
+    If a groove makes the axial shift S1 (`GrooveShift`), its amplitude and ratio are included.
+    """
     values = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     if isinstance(turn.law, GrooveShift):
         values |= {"groove_amplitude": turn.law.amplitude, "groove_ratio": turn.law.ratio}

@@ -106,7 +106,7 @@ class SystemRun:
         return brought / through if through > 0.0 else 0.0
 
     def suggested_step(self, share: float) -> float | None:
-        """Return the communication step with which the coupling would add a given share of the work (s).
+        """Return the communication step (s) with which the coupling would add a given share of the transmitted work.
 
         The step is valid if the steps of the run are equal, and so small that a residual is proportional to the step, or to the
         square of the step if the inputs are linear in time. The result is None if the coupling added no work, as without power
@@ -120,7 +120,7 @@ class SystemRun:
 
 
 class _Instances:
-    """All instances of a system, with their inputs and outputs at the present communication point."""
+    """All instances of a system, with their inputs and outputs at the current communication point."""
 
     def __init__(self, wiring: Wiring, bonds: Sequence[Bond]) -> None:
         self.wiring = wiring
@@ -243,7 +243,10 @@ class _Instances:
             self.outputs = self._read()
 
     def _keep_end_values(self, before: Floats, slopes: Floats | None, step: float) -> None:
-        """Store the values of the inputs at the end of a step; an input whose rate is connected, too, moves at that rate."""
+        """Store the values of the inputs at the end of a step.
+
+        If the rate of an input is connected, too, the input changes at this rate.
+        """
         values = before[self.sources]
         self.given = values.copy()
         for name, (_, numbers) in self.own.items():
@@ -279,7 +282,7 @@ def count_steps(stop_time: float, step: float) -> int:
 
 
 class _Stepper:
-    """Controller that keeps the communication step constant, or adapts it so that the coupling adds a wanted share of work."""
+    """Controller that keeps the communication step constant, or adapts it so that the coupling adds a wanted share of power."""
 
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share
@@ -334,8 +337,8 @@ def run_system(
         Communication step and end of the run (s); by default those of the wiring. If the steps do not fill the run, the last
         one is shorter.
     share : float, optional
-        Share of the work that the coupling may add, such as 1e-3, relative to the power that the bonds transmitted recently.
-        The share controls the length of the steps; ``step`` is the length of the first step.
+        Wanted error of the coupling, such as 1e-3: the power that the coupling adds, as a fraction of the greatest power that
+        the bonds have transmitted recently. It controls the length of the steps; ``step`` is then the first step.
     progress : bool
 
     Returns

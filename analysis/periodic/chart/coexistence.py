@@ -523,12 +523,13 @@ def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
 def _default_plane(
     parameters: Parameters, drive: Drive, first: PeriodicOrbit, moved: FloatArray, place: int
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the ranges of a coordinate and of its rate: `_WIDTH` times the ranges over which the motions move.
+    """Return the ranges of a coordinate and of its rate in a plane of starts: `_WIDTH` times the ranges of the motions.
 
     ``moved`` are samples of y of all motions, ``first`` is the first motion, and ``place`` the index of the coordinate in y.
-    The range of the coordinate is cut where the links cannot be joined. It is the full range of assembly, centred on the
-    initial value, if the coordinate is at rest in all motions, or is an angle whose range would be cut. A rate that is zero in
-    all motions has the range of an oscillation over the coordinate's range at the crank's speed.
+    The range of the coordinate ends where the links can no longer be joined. In two cases it is instead the largest range,
+    symmetric about the initial value, in which they can be joined: if the coordinate is at rest in all motions, and for an
+    angle whose range would end at such a limit. If the rate is zero in all motions, its range is that of an oscillation
+    through the range of the coordinate at the frequency of the crank.
     """
     lowest, highest = (float(side[place]) for side in assembly_ranges(parameters, drive, first.start))
     rest, scale, rates = float(first.flow.rest[place]), first.scale, place + len(first.start) // 2

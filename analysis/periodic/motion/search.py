@@ -304,7 +304,7 @@ class Orbits(NotebookResult):
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return the end of an error message: which motions, in which links go round, were not sought.
+    """Return the end of an error message, which says which motions with links that go round were not sought.
 
     The result is empty if no link can go round.
     """
@@ -504,7 +504,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which the undriven links with a ratio in the drive go round and the others only swing."""
+    """Find the periodic motions in which an undriven link goes round if the drive has a ratio for it, and otherwise swings."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     ranges = start_ranges(point.parameters, point.drive, guess)
@@ -600,7 +600,10 @@ class _FoundMotions:
             return False
 
     def follow(self, place: FloatArray) -> None:
-        """Follow the mechanism from a start for some turns, and search from there: stable motions have wide basins."""
+        """Let the mechanism run from a start for some turns, and search from its last state.
+
+        This finds stable motions, since the mechanism comes close to one of them by itself.
+        """
         status, start = settle_motion(self.point, place, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=_TURNS)
         if status is Status.DONE:
             self.seek(start, divide=False)

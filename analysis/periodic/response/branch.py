@@ -304,9 +304,11 @@ def switch(
 
 
 def motion_sizes(orbit: PeriodicOrbit, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return for each component of y how large motions are, relative to the scale: thirty times the amplitude, 1 at most.
+    """Return for each component of y the factor, at most 1, that adapts the scale of ``orbit`` to the size of the motion.
 
-    The scale is the scale of ``orbit``. It follows from the links, and motions may be much smaller than links.
+    The scale follows from the lengths of the links, and motions may be much smaller. The adapted scale of a coordinate is
+    thirty times its amplitude, but never more than the scale, which is also kept if the amplitude is zero. A rate has the
+    factor of its coordinate.
     """
     free = len(orbit.flow.free)
     shares = amplitudes[:free] / orbit.scale[:free]
@@ -529,14 +531,16 @@ def _insert_dips(curve: Curve, follower: Follower) -> Curve:
 
 
 def _crossings(before: Point, after: Point, changed: set[Crossing]) -> Iterator[tuple[Crossing, Crossing]]:
-    """Yield the crossings between two neighbouring points of a branch, each with the kind whose test function is zero there.
+    """Yield the kind of each special point between two neighbouring points of a branch, and the kind of its test function.
 
-    ``changed`` are the kinds whose test functions change their sign between the points.
+    The special point lies where this test function is zero. The two kinds differ only at a branch point at which the
+    parameter turns back: it is located by the test function of a fold. ``changed`` are the kinds whose test functions change
+    their sign between the two points.
     """
     ends = before.data, after.data
     turned = Crossing.FOLD in changed
     # where two branches cross, either the parameter turns back or det(I - M) changes its sign; at a fold both do. Without
-    # damping or stiffness multipliers lie at the crossing all along, and their rounding crosses nothing
+    # damping or stiffness a multiplier is 1 on the whole branch, and a change of sign by rounding means nothing
     crossed = turned != (Crossing.BRANCH_POINT in changed) and (
         max(float(np.abs(end.multipliers - 1.0).min()) for end in ends) > _AT_CROSSING
     )

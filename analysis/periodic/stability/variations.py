@@ -71,10 +71,10 @@ class Place(NamedTuple):
 
 
 class _Kink(NamedTuple):
-    """A panel at which the derivatives of the rates jump, with the jumps.
+    """Kink of the rates: their derivatives jump, as at the bend of a spring's table.
 
-    The rates are continuous at a kink: before it they are F, after it F + g h, where h, a function of y, of the angle and of
-    the constants, is zero at the kink. The jumps are therefore multiples of g.
+    At a kink the rates themselves are continuous: they are F before it and F + g h after it. The scalar h is a function of y,
+    the angle and the constants, and is zero at the kink. The jumps of the derivatives are therefore multiples of the vector g.
     """
 
     panel: int  # index of the panel
@@ -171,7 +171,7 @@ class Variations:
         return joined
 
     def _find_kinks(self) -> list[_Kink]:
-        """Return the panels at which the derivatives of the rates jump, as at the bend of a spring's table.
+        """Return the kinks of the rates.
 
         A kink is between the first node of its panel and the first node of the next one.
         """

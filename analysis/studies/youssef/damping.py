@@ -37,7 +37,7 @@ from .linearised import with_crank
 from .regions import appendix_3_region, crank_speed, equation, first_order_region, hill_region, removing_estimate
 from .runs import ALIKE_WORDS, SIGN
 
-#: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
+#: The stated damper: omega_c (1/s) that removes the region up to I4 = 1.5 according to the thesis.
 STATED = 0.45
 #: Range of the chart over lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
 BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
@@ -139,7 +139,10 @@ def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEq
 
 
 def judge_shifts() -> tuple[Case, ...]:
-    """Judge how the stated damper shifts regions 1 to 4 of (5.30) and changes their widths, for the I4 of `COMPARED`."""
+    """Judge how a damper of omega_c = `STATED` shifts regions 1 to 4 of (5.30) and changes their widths.
+
+    The values of I4 are those of `COMPARED`.
+    """
     found: list[tuple[float, float, float]] = []
     for ratio in COMPARED:
         for n, free in hill_regions(equation_without_factor(ratio, 0.0), 4).items():
@@ -157,7 +160,7 @@ def judge_shifts() -> tuple[Case, ...]:
 
 
 def error_of_factor(inertia_ratio: float) -> float:
-    """Return the greatest error of the multipliers by (5.28) and (5.29), with the stated damper.
+    """Return the greatest error of the multipliers by (5.28) and (5.29), with a damper of omega_c = `STATED`.
 
     The multipliers of (5.29), times the factor of (5.28), are compared with those of the whole equation.
     """
@@ -198,7 +201,7 @@ def determinant_errors(harmonics: int, order: int = 2) -> dict[int, float]:
     """Return the errors of regions 1 to 4 by the determinant (5.35) at I4 = 1, relative to the regions' widths.
 
     The coefficients of the divided equation (5.27) are cut after the given number of harmonics, and the solution (5.31) after
-    the harmonic ``order``: nine terms at 2. Each error is the greater of the region's two boundaries.
+    the harmonic ``order``; with order 2 it has nine terms. Each error is the greater of the region's two boundaries.
     """
     exact = equation(chapter_4(1.0))
     cut = divide_by_mass(exact, harmonics)

@@ -1,4 +1,4 @@
-"""Rig 1: the motions about resonance, where the rig could not be run, and the effect of friction on the amplitudes."""
+"""Rig 1: the motions near resonance, where the rig could not be run, and the effect of friction on the amplitudes."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns
 
 @cache
 def sweep_speed(spring: str, rising: bool) -> Sweep:
-    """Sweep the speed up or down in steps: with spring A over all speeds, with spring B about resonance."""
+    """Sweep the speed up or down in steps: with spring A over all speeds, with spring B near resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
     return sweep(rig(spring), speeds if rising else speeds[::-1])
 
 
 def special_points() -> list[SpecialPoint]:
-    """Return the folds and period doublings of the branches about resonance with spring B."""
+    """Return the folds and period doublings of the branches near resonance with spring B."""
     return [special for branch in resonant_b().branches for special in branch.special]
 
 
@@ -112,7 +112,7 @@ def accommodated_amplitude(spring: str) -> tuple[float, float]:
 
 
 def draw_rig_1(result: StudyResult) -> Figure:
-    """Draw the amplitude over the speed: spring A, spring B up to resonance, and spring B about resonance."""
+    """Draw the amplitude over the speed: spring A, spring B up to resonance, and spring B near resonance."""
     below = [c for n in NAMES[:2] for c in curves_over_speed(result, f"spring B; {n}", COLOURS[0])]
     about = [c for n, colour in zip(NAMES[1:], COLOURS) for c in curves_over_speed(result, f"spring B; {n}", colour, n)]
     for name, label, line, marker, colour in (

@@ -134,7 +134,7 @@ def _like_one_mass(
 ) -> tuple[Statement, ...]:
     """Compare the motion of rig 2 with that of a damped mass on a spring.
 
-    ``first`` has the first harmonic (cm, complex) at the speeds (rpm) by spring; ``about`` has further speeds about half the
+    ``first`` has the first harmonic (cm, complex) at the speeds (rpm) by spring; ``about`` has further speeds near half the
     natural frequency.
     """
     rates, constant, phase, spread, beyond = RAD_S_PER_RPM * speeds, [], [], [], []
@@ -569,7 +569,7 @@ def draw_forces(result: StudyResult) -> Figure:
 
 
 def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: str = "") -> Panel:
-    """Build the panel of a spring over the speed; the panel of spring D, on the right, has the legend for both."""
+    """Build the panel with the curves ``lines`` over the speed for one spring; that of spring D has the legend for both."""
     first = spring == "C"
     return Panel(
         x_label="crank speed [rpm]",

@@ -43,7 +43,7 @@ SEEN_IN_RECORDS = (
 SLIGHT = 0.05
 #: The rig of each spring.
 RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
-#: Speeds of the curves (rpm). With spring B the curve is followed in two parts: up to `SPLIT`, and about resonance from there
+#: Speeds of the curves (rpm). With spring B the curve is followed in two parts: up to `SPLIT`, and near resonance from there
 #: on; below it the branches that come down from resonance run into the limit of assembly.
 SLOWEST, SPLIT = 100.0, 900.0
 FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
@@ -94,7 +94,7 @@ def motions(spring: str) -> Response:
 
 
 def resonant_b() -> Response:
-    """Return the periodic motions with spring B about resonance: first the lower branch, then the upper branch."""
+    """Return the periodic motions with spring B near resonance: first the lower branch, then the upper branch."""
     return response("B", SPLIT, FASTEST["B"], COARSE)
 
 

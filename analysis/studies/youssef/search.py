@@ -71,10 +71,10 @@ class Found(NamedTuple):
 
 
 def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[FloatArray, FloatArray]:
-    """Return the distances along x and y (cm) of P from n points of an ellipse, by each of the two closures.
+    """Return the distances along x and y (cm) of P from n points of an ellipse, for each of the two closures.
 
-    ``v`` are the parameters in the order of `LOW`; ``semi_axis`` is the ellipse's semi-axis along x (cm), by default that of
-    ellipse (a).
+    A closure is one of the two ways in which the links can be joined at every crank angle. ``v`` are the parameters in the
+    order of `LOW`; ``semi_axis`` is the ellipse's semi-axis along x (cm), by default that of ellipse (a).
     """
     x0, y0, l1, l2, l3, l4, r, a1, th20, a2 = v
     pin = l2 * np.exp(1j * (turn(n) + th20))
@@ -87,7 +87,7 @@ def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[Float
 
 
 def error(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> float:
-    """Return the sum of the squared distances (cm2) by the better of the two closures; see `residuals`."""
+    """Return the sum of the squared distances (cm2) for the better of the two closures; see `residuals`."""
     return min(float(away @ away) for away in residuals(v, n, semi_axis))
 
 
@@ -183,7 +183,8 @@ def searches() -> dict[str, tuple[Found, ...]]:
 def run_ranked() -> tuple[tuple[Found, ...], ...]:
     """Run the searches that are compared by rank, and return the results of each kind.
 
-    The kinds are: from random sets; with 12 points first; with five parameters first; with nine; with 36 points first.
+    The kinds are: from random sets; with 12 points first; with five parameters first; with nine parameters first; with 36
+    points first.
     """
     random = np.random.default_rng(62)
     plain = tuple(downhill(error, starting_sets(random, [])) for _ in range(RANKED))
@@ -193,7 +194,10 @@ def run_ranked() -> tuple[tuple[Found, ...], ...]:
 
 
 def rocker_error(v: FloatArray) -> float:
-    """Return the error (deg2) of the rocker function of Fig 6.7: the sum of squares at N crank angles by the better closure."""
+    """Return the error (deg2) of the rocker function of Fig 6.7: the sum of squares at N crank angles.
+
+    The links can be joined in two ways; the error is that of the better way, the same at all crank angles.
+    """
     l1, l2, l3, l4 = v[2:6]
     phi = turn(N)
     pin = l2 * np.exp(1j * (phi + v[8]))
@@ -235,7 +239,7 @@ def _second_search(first: Found, share: float, random: np.random.Generator) -> F
 
 
 def descend(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
-    """Return the parameters and the error (cm2) at the end of a least-squares descent, by closure ``side``, with n points."""
+    """Return the parameters and the error (cm2) at the end of a least-squares descent, for closure ``side`` and n points."""
     inside = np.clip(v, FREE_LOW + 1e-9, FREE_HIGH - 1e-9)
     end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(FREE_LOW, FREE_HIGH), xtol=1e-12, ftol=1e-12)
     return end.x, 2.0 * float(end.cost)

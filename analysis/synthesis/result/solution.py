@@ -78,7 +78,10 @@ class Evaluation:
 
     @property
     def worst(self) -> float:
-        """Return the largest of the combined errors (m or rad), or `hausdorff`, which counts the curve beyond the path, too."""
+        """Return the largest of the combined errors (m or rad); if `hausdorff` is known, return it instead.
+
+        `hausdorff` also counts the points of the coupler curve that are far from the path.
+        """
         return float(self.combined_errors.max()) if self.hausdorff is None else self.hausdorff
 
 

@@ -215,15 +215,15 @@ class RotationRequirement(Require):
         return cls(rotation=np.linspace(*ends, GRID, endpoint=not turn), ends=(ends[0] - over, ends[1] + over), **more)
 
     def find_peaks(self, values: SimpleNamespace, count: int) -> FloatArray:
-        """Find the ``count`` highest peaks of the function, for given dimensions, and their curvatures.
+        """Find the ``count`` highest peaks of the n values of the function over the crank rotation, for given dimensions.
 
         Returns
         -------
         ndarray, shape (count, 1 + n)
             A row for each peak, the highest first; the ends of the range count as peaks. The first column is the crank rotation
-            (rad). Then follows, for each of the n values of the function, -1/2 divided by the second derivative of this value,
-            or 0 if this value has no peak there; with the slope it gives the height of a nearby peak. If there are fewer peaks,
-            the first row is repeated.
+            (rad). Column 1 + i belongs to value i: it is -1/(2 f''), with the second derivative f'', if value i has this peak,
+            else 0. Near the peak, where value i is f and its slope f', the height of the peak is f - f'^2/(2 f''). If there are
+            fewer peaks, the first row is repeated.
         """
         assert self.ends is not None
         rotation = np.linspace(*self.ends, DENSE)
