@@ -72,7 +72,7 @@ def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
 
 @lru_cache(maxsize=64)
 def _twists(mechanism: Mechanism) -> dict[str, int]:
-    """Return the index of the output that is the twist of a spring, by spring, for all springs whose turns are not counted."""
+    """Return, by the name of each spring whose turns are not counted, the index of the output that is its twist."""
     names = mechanism.output_names
     return {v.of: names.index(v.name) for v in mechanism.variables if v.role == "twist"}
 
