@@ -1,4 +1,7 @@
-"""Chapter III: the five-bar slider of Table 3.1 at 420 rpm, with three springs (3.4, 3.5) and in modules of their own."""
+"""Figures 3.4 and 3.5: the five-bar slider of Table 3.1 at 420 rpm with three springs.
+
+The other figures of chapter III are in `no_spring`, `launches` and `free_crank`.
+"""
 
 from __future__ import annotations
 

@@ -438,7 +438,7 @@ def _balance() -> list[Statement]:
 
 
 def _first_order_series(parts: Coefficients) -> tuple[FourierSeries, ...]:
-    """Return the series of M, K and F: the thesis's coefficients of inertia, stiffness and force over the spring's.
+    """Return the series of M, K and F: the thesis's coefficients of inertia, stiffness and force, divided by the spring's.
 
     The quotients are taken to first order and have one harmonic.
     """

@@ -158,9 +158,9 @@ def count_late_violations() -> int:
 
 
 def share_of_values() -> float:
-    """Return how many values of (6.12) are computed in a test of the random four-bars at 0 and 180 deg only.
+    """Return the number of values of (6.12) in a test at 0 and 180 deg only, divided by the number in a test at all angles.
 
-    The result is relative to a test at all crank angles. The test of a four-bar stops at the first negative value.
+    The random four-bars are tested; the test of each stops at the first negative value.
     """
     violated = assembly_arguments() < 0.0
     at_two, at_all = (
