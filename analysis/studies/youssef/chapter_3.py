@@ -1,6 +1,6 @@
 """Figures 3.4 and 3.5: the five-bar slider of Table 3.1 at 420 rpm with three springs.
 
-The other figures of chapter III are in `no_spring`, `launches` and `free_crank`.
+Figures 3.2 and 3.3 are in `no_spring`, Figures 3.6 to 3.10 in `launches`, Figures 3.11 to 3.14 in `free_crank`.
 """
 
 from __future__ import annotations
