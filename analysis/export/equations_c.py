@@ -102,7 +102,8 @@ int equations_{name}{sides} {{
     return text
 
 
-#: Functions that contain a solution if the switch is on: the function called then, its number of arguments, its results.
+#: Functions that need the contact forces if the switch is on: the function that is then called with these forces, the number
+#: of its other arguments, and its results.
 _SWITCHED = {
     "derivative": ("values", 4, "unused, res[0]"),
     "outputs": ("values", 4, "res[0], unused"),

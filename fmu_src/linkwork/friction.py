@@ -68,7 +68,7 @@ def mark_converged(s: tuple[float, ...]) -> tuple[float, ...]:
 def _newton_step(
     smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...], least: float
 ) -> tuple[float, ...]:
-    """Take one step of Newton's method for the magnitudes ``s``, where ``least`` is F0^2; see `contact_forces`."""
+    """Take one step of Newton's method for the magnitudes ``s`` of contact forces; ``least`` is F0^2 of `contact_forces`."""
     n = range(len(smooth))
     forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
     size = tuple(sqrt(x * x + y * y + least) for x, y in forces)

@@ -11,7 +11,8 @@ dyad has a letter for each joint, R for a pin and P for a slide; the middle lett
 functions are arithmetic without branches.
 
 In all functions n is the number of degrees of freedom, v are the rates of their coordinates, u x w is the scalar
-u_x w_y - u_y w_x, and J rotates a vector by +90 degrees.
+u_x w_y - u_y w_x, and J rotates a vector by +90 degrees. An arm is the vector from the origin of a body to one of its points.
+Outer axes are those of the ground or of the body that carries the dyad.
 """
 
 from __future__ import annotations
