@@ -323,6 +323,8 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
             chosen.append((name, CASES[name]))
         elif Path(name).suffix in (".toml", ".json"):
             chosen.append((Path(name).stem, load_case(name)))
+        elif Path(name).suffix == ".fmu":
+            raise click.UsageError(f"{name} is an FMU, not a case: linkwork check --fmu {name}")
         else:
             raise common.unknown_name_error(name, CASES, f"standard case or case file {name!r}")
     return chosen
