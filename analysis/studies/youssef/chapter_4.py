@@ -181,7 +181,8 @@ def compute_first() -> StudyResult:
     by_mean = {ratio: OMEGA_K - OMEGA_K / sqrt(equation(ratio, Variant.EXACT).mass.mean) for ratio in below}
     return StudyResult(
         claim="First harmonic over the crank speed without damping, for three inertia ratios.",
-        assignment="The three inertia ratios are our choice: 1 and 0.5 of Fig 4.6 and 4.7, and 1.5.",
+        assignment="The three inertia ratios are our choice: 1 and 0.5 of Fig 4.6 and 4.7, and 1.5. The motions of Figs 4.3, "
+        "4.4, 4.6 and 4.7 are found with two harmonics, as in (4.30), unless a row says otherwise.",
         columns=undamped_columns(1),
         statements=(
             Statement(

@@ -464,9 +464,9 @@ def compute_harmonics() -> StudyResult:
                 "Fig. (8.21). These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 "
                 "and hence are in agreement with the experiment.",
                 text("8.4.2.2, L6877-6885"),
-                "greatest first harmonic divided by the greatest second harmonic, each at its own speed, by the linear "
-                "equation, corrected, to second order of sigma2, because the terms of (4.21) for a coupler with mass are "
-                "illegible in our scan. What the experiment showed is judged at L6871",
+                "greatest first harmonic divided by the greatest second harmonic, each at its own speed, by two harmonics of "
+                "the linear equation, corrected, to second order of sigma2, because the terms of (4.21) for a coupler with "
+                "mass are illegible in our scan. What the experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", min(second[s]), ABOUT * 50.0) for s in "CD"),
                 "the second harmonic is about 1.5 times as large as a fiftieth of the first. To first order of sigma2, as "
