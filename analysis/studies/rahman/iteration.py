@@ -203,8 +203,8 @@ def judge_convergence() -> tuple[Statement, ...]:
             tuple(at_most(where, 0.0, float(f"{share:.2g}")) for where, share in settled.items()),
             "it settles nevertheless, in the plane from about half of the starts on the wanted loop and from most others on "
             "that of the other assembly. Rounding errors decide at many starts: if the angles of all starts are changed by "
-            "1e-10 deg, 5% of those in the plane and 12% of those out of it end differently, and the shares change by about "
-            "a hundredth",
+            "1e-10 deg, 5% of those in the plane and 12% of those out of it end differently, and the shares change by one "
+            "or two hundredths",
         ),
         Statement(
             "Usually the process converges in 3 to 6 iterations if estimates are within 20 degrees, which is quite "
