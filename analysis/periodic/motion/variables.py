@@ -103,7 +103,8 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed" or freedom == drive.reference(mechanism).freedom:
         if (what == "speed") != drive.speed_drive:
-            raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+            given = "speed" if drive.speed_drive else "torque"
+            raise InputError(f"{name} cannot vary: the drive is by {given}; give {name} in its place")
         if what == "speed" and not _crank_ratio(mechanism, drive, freedom):
             raise InputError(f"{name} cannot vary: this crank is not commanded to turn")
     elif name in force_inputs(mechanism):
