@@ -45,7 +45,7 @@ def chart() -> Any:
 def synthesis() -> Any:
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     ellipse = np.column_stack([0.2 * np.cos(angle), 0.1 * np.sin(angle)])
-    found = synthesize(TimedPath(points=ellipse), search=Search(starts=96, candidates=1 << 12))
+    found = synthesize(TimedPath(points=ellipse), search=Search(starts=288, candidates=1 << 12))
     return np.array([list(s.linkage.values().values()) for s in found.solutions])
 
 
@@ -59,7 +59,7 @@ def samples() -> Any:
 WORK: dict[str, Callable[[], Any]] = {
     "ensemble, 300 runs of 10 s": ensemble,
     "chart, 120 x 60 orbits": chart,
-    "synthesis, 96 starts": synthesis,
+    "synthesis, 288 starts": synthesis,
     "Monte Carlo, 48 x 200,000 samples": samples,
 }
 

@@ -225,7 +225,9 @@ def polish(
 
     def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
         cores = search.cores
-        size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
+        # as many pieces for each core, at least three
+        pieces = cores * max(3, -(-len(items) // (MOST * cores)))
+        size = 1 if cores == 1 else max(1, -(-len(items) // pieces))
         # a polisher holds compiled solvers, which cannot be sent to a process: each part of the work makes its own
         made = (lambda: worker) if cores == 1 else partial(Polisher, normal, limits, pivot)
         step = partial(_call_polisher, name, made)
