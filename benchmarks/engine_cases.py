@@ -5,7 +5,7 @@ reference is the solution of `linkwork`'s reduced equations at a tolerance of 1e
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from math import ceil, cos, inf, isfinite, pi, sin
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from linkwork.five_bar.parameters import Constants, FiveBarParameters, InitialSt
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Case:
     """A run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
 
@@ -39,7 +39,7 @@ class Case:
         if self.parameters.slider_coulomb_friction != 0.0:
             raise ValueError("the engine models have no Coulomb friction in the guide")
 
-    @property
+    @cached_property
     def times(self) -> np.ndarray:
         """Sample times (s), including the start."""
         return np.linspace(0.0, self.duration, self.samples + 1)
@@ -49,9 +49,9 @@ class Case:
         """Crank speed at the start (rad/s)."""
         return self.crank_speed or 0.0
 
-    @property
+    @cached_property
     def inputs(self) -> Inputs:
-        """Inputs of a run in process."""
+        """Inputs of a run in process, the same for every run."""
         return Inputs(speed=self.crank_speed) if self.crank_speed else Inputs(torque=TorsionBar(torque=self.torque))
 
 

@@ -46,8 +46,8 @@ def time_in_process(case: Case) -> tuple[list[Timing], str]:
     run = partial(run_in_process, case)
     found = loosest_setting(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
     assert found.reached, "the in-process solver does not reach the accuracy"
-    whole = shortest_time(lambda: run(found.setting), 50)
-    inner = integration_time(lambda: run(found.setting), 50)
+    whole = shortest_time(lambda: run(found.setting), 500)
+    inner = integration_time(lambda: run(found.setting), 500)
     statistics = run(found.setting).statistics
     steps, evaluations = int(statistics["steps"]), int(statistics["evaluations"])
     bare = right_hand_side_time(case.parameters, case.inputs, _states(case)) * evaluations

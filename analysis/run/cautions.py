@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import pi
+from math import isfinite, pi
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,7 @@ def _undefined_outputs(names: Sequence[str], time: NDArray[np.float64], values: 
 
     ``values`` are the outputs ``names`` at the samples, shape (n, outputs), and ``time`` the times of the samples (s).
     """
-    if np.isfinite(values.sum()):
+    if isfinite(np.add.reduce(values, axis=None)):
         return ""
     samples, columns = np.nonzero(~np.isfinite(values))
     found = [names[column] for column in dict.fromkeys(columns.tolist())]
