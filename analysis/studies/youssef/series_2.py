@@ -205,15 +205,12 @@ def _rocker() -> tuple[Statement, ...]:
     angles, heavy = len(weights), np.count_nonzero(weights == WEIGHT)
     best_reading, span = joined[0], error_range(ROCKER, joined[0])
     fixed = errors_by_reading(ROCKER, p.linkage)
-    least_read, reading = min(
-        (value, name) for each in joined for name, value in errors_by_reading(ROCKER, each).items()
-    )
+    least_read, reading = min((x, name) for each in joined for name, x in errors_by_reading(ROCKER, each).items())
     raised = linkage_error(ROCKER, best_reading) / linkage_error(ROCKER, p.linkage)
     lowered = linkage_error(PATH, mended_path_linkage()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
     two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
     fewer = f"{SEEN_FALL}; an additional freedom cannot raise the least error"
-    # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
-    unknowns = 6
+    unknowns = 6  # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
     return (
         Statement(
             "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
