@@ -280,10 +280,11 @@ class _CaseFile(click.Path):
     """Path of a case file; the name of a published set is refused with the option that takes it."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from ..mechanisms import PUBLISHED
+        if not Path(value).exists():
+            from ..mechanisms import PUBLISHED
 
-        if value in PUBLISHED and not Path(value).exists():
-            self.fail(f"{value} is a published set: --published {value}", param, ctx)
+            if value in PUBLISHED:
+                self.fail(f"{value} is a published set: --published {value}", param, ctx)
         return super().convert(value, param, ctx)
 
 

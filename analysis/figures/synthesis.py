@@ -208,8 +208,8 @@ def _function_scale(scene: syn.LinkageScene) -> tuple[str, str, float]:
     return "target x [m]", "slider position x [mm]", MM_PER_METRE
 
 
-def _plot_function(axis: Axes, scene: syn.LinkageScene) -> None:
-    """Plot the rocker's angle or the slider's position over the crank rotation with its target."""
+def _plot_function(axis: Axes, scene: syn.LinkageScene) -> tuple[FloatArray, FloatArray]:
+    """Plot the rocker's angle or the slider's position over the crank rotation with its target; return the curve."""
     assert scene.function is not None
     heading, label, factor = _function_scale(scene)
     turns, values = np.degrees(scene.function[0]), factor * scene.function[1]
@@ -228,6 +228,7 @@ def _plot_function(axis: Axes, scene: syn.LinkageScene) -> None:
     axis.set_xlabel("crank rotation [deg]")
     axis.set_ylabel(label)
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
+    return turns, values
 
 
 def _within_task(scene: syn.LinkageScene, turns: FloatArray) -> NDArray[np.bool_]:
@@ -269,8 +270,8 @@ def _plot_errors(axis: Axes, scene: syn.LinkageScene) -> None:
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> None:
-    """Plot the transmission angle over a crank turn; the part of the turn that the task uses is a thick line."""
+def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> tuple[FloatArray, FloatArray]:
+    """Plot the transmission angle over a crank turn, with a thick line where the task uses it; return the curve."""
     rotation, angle = scene.transmission
     turns, angles = np.degrees(rotation), np.degrees(angle)
     axis.plot(turns, angles, color=style.COUPLER, linewidth=style.THIN, alpha=0.5)
@@ -280,6 +281,7 @@ def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> None:
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
     _tick_quarter_turns(axis, turns)
     axis.set_ylabel("transmission\nangle [deg]")
+    return turns, angles
 
 
 def _plot_pivot_motion(axis: Axes, scene: syn.LinkageScene) -> None:
@@ -499,12 +501,7 @@ def animate_solution(
     figure = Figure(figsize=(5.4, tall + 2.1))
     above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
     style.write_title(figure, scene.title)
-    if scene.function is None:
-        _plot_transmission(below, scene)
-        x, y = np.degrees(scene.transmission)
-    else:
-        _plot_function(below, scene)
-        x, y = np.degrees(scene.function[0]), _function_scale(scene)[2] * scene.function[1]
+    x, y = (_plot_transmission if scene.function is None else _plot_function)(below, scene)
     (now,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=6)
     trace: list[FloatArray] = []
     _set_one_scale(above, frame.low, frame.high)

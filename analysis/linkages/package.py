@@ -98,7 +98,7 @@ VARIABLES = (
 
 def check_assembly(x: tuple[float, ...], p: equations.Constants) -> None:
     """Check that the bodies can be joined at the state x."""
-    planar.check_clearance(equations.places, x, p, MECHANISM.describe_state(x))
+    planar.check_clearance(equations.places, x, p, lambda: MECHANISM.describe_state(x))
 
 
 MECHANISM = Mechanism(

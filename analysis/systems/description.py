@@ -32,6 +32,11 @@ HERE = resources.files(__package__)
 PARTNERS = ("induction-motor", "flywheel-gear", "line-shaft", "press-load")
 
 
+def _flat_table(value: Any, name: str) -> dict[str, Any]:
+    """Return a table whose names with dots may be tables within tables."""
+    return files.flatten(files.as_table(value, name))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTable:
     """Table of a part of a system: a case, a partner, a controller or an FMU, and start values.
@@ -55,7 +60,7 @@ class PartTable:
     partner: str = entry(files.Choice(PARTNERS), "")
     controller: str = entry(files.Choice(CONTROLLERS), "")
     fmu: str = entry(files.text, "")
-    values: Mapping[str, Any] = entry(lambda value, name: files.flatten(files.as_table(value, name)), factory=dict)
+    values: Mapping[str, Any] = entry(_flat_table, factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +77,7 @@ def _parts(value: Any, name: str) -> dict[str, PartTable]:
 
 def _connections(value: Any, name: str) -> dict[End, End]:
     ends = {}
-    for target, source in files.flatten(files.as_table(value, name)).items():
+    for target, source in _flat_table(value, name).items():
         pair = []
         for text in (target, files.text(source, f"{name}.{target}")):
             part, dot, port = text.partition(".")

@@ -48,13 +48,13 @@ class UnjoinedMessages(NamedTuple):
     near: str
     reach: Callable[..., tuple[float, ...]] | None = None
 
-    def check(self, sine: float, x: Sequence[float], p: Any, where: str) -> None:
-        """Raise AssemblyError if state x, described in words by ``where``, is at the limit of assembly or beyond it.
+    def check(self, sine: float, x: Sequence[float], p: Any, where: Callable[[], str]) -> None:
+        """Raise AssemblyError if state x is at the limit of assembly or beyond it; ``where()`` describes x in words.
 
         ``sine`` is the sine of the angle from the limit of assembly; if the links cannot be joined, it is not positive.
         """
         if sine >= LIMIT_SINE:
             return
         if sine > 0.0:
-            raise AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(sine)))}")
-        raise AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")
+            raise AssemblyError(f"{ASSEMBLY} at {where()}: {self.near.format(degrees(asin(sine)))}")
+        raise AssemblyError(f"{self.fact} at {where()}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")

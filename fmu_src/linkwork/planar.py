@@ -651,8 +651,8 @@ UNJOINED = UnjoinedMessages(
 )
 
 
-def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
-    """Check that the bodies can be joined in state x; ``where`` describes x in words.
+def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: Callable[[], str]) -> None:
+    """Check that the bodies can be joined in state x; ``where()`` describes x in words.
 
     ``places(x, p)`` computes the poses of the bodies, and their ``clearance``.
 

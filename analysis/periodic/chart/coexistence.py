@@ -470,13 +470,11 @@ def _measures(point: OperatingPoint, found: Orbits) -> FloatArray:
     free vibration is much slower than the crank, equal deviations of position and of rate, in units of the scale, may cause
     amplitudes of which one is a hundred times the other.
     """
-    passed, measures = [orbit.passages() for orbit in found.orbits], []
-    scale, unit = point.scale(passed[0][0]), np.eye(point.flow.size)
-    for orbit, starts in zip(found.orbits, passed):
-        if not any(orbit is motion for motion in found.stable):
-            continue
-        others = np.vstack([np.empty((0, len(scale))), *(p for p in passed if p is not starts)])
-        for start in starts:
+    passed, measures = {id(orbit): orbit.passages() for orbit in found.orbits}, []
+    scale, unit = point.scale(found.orbits[0].start), np.eye(point.flow.size)
+    for orbit in found.stable:
+        others = np.vstack([np.empty((0, len(scale))), *(starts for of, starts in passed.items() if of != id(orbit))])
+        for start in passed[id(orbit)]:
             decay = point.period(start, orbit.periods).monodromy * scale / scale[:, None] / _GROWTH
             form = scipy.linalg.solve_discrete_lyapunov(decay.T, unit)
             measure = np.linalg.cholesky(form / np.linalg.eigvalsh(form)[0]).T / scale

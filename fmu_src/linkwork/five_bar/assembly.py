@@ -29,8 +29,14 @@ def check_assembly(crank_angle: float, slider_position: float, p: Constants) -> 
     """
     square = kinematics.assembly_square(crank_angle, slider_position, p)
     sine = copysign(sqrt(abs(square)) / (p.l3 * p.l4), square)
-    at = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
-    UNJOINED.check(sine, (crank_angle, slider_position), p, at)
+    UNJOINED.check(
+        sine,
+        (crank_angle, slider_position),
+        p,
+        lambda: (
+            f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
+        ),
+    )
 
 
 def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:

@@ -29,8 +29,12 @@ def check_assembly(crank_angle: float, shift: float, p: Constants) -> None:
     """
     square = kinematics.assembly_square(crank_angle, shift, p)
     sine = copysign(sqrt(abs(square)) / p.a2, square)
-    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
-    UNJOINED.check(sine, (crank_angle, shift), p, where)
+    UNJOINED.check(
+        sine,
+        (crank_angle, shift),
+        p,
+        lambda: f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m",
+    )
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
