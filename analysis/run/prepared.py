@@ -6,7 +6,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
-from math import nan, pi
+from math import isfinite, nan, pi
 from typing import Any
 
 import numpy as np
@@ -127,7 +127,7 @@ class Run:
             slope = self.mechanism.equations.derivative(state, acting, self.p) if great else ()
         except UNDEFINED:
             slope = (nan,)
-        if not np.isfinite([energy, *slope]).all():
+        if not all(map(isfinite, (energy, *slope))):
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
             name = max(values, key=lambda name: abs(values[name]))

@@ -70,8 +70,9 @@ def sample(
             there = function_values(encoded, ahead, x)
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
-    lost = next((n for n, value in enumerate(u.tolist()) if not isfinite(value)), None)
-    if lost is not None:
+    finite = [isfinite(value) for value in u.tolist()]
+    if not all(finite):
+        lost = finite.index(False)
         # if inputs are held, the derivative of a command is the slope of its secant
         commands = {int(rate): int(value) for value, _, rate in encoded.commands}
         secant = ahead > t and np.isfinite(here[lost])
