@@ -18,9 +18,9 @@ from . import reader
 from .reader import Choice, Many, Quantity, Range, Reader, Table, Whole
 
 #: Easily read units by SI unit, each with the factor from SI.
-_FRIENDLY = {"rad": ("deg", degrees(1.0)), "rad/s": ("rpm", 30.0 / pi)}
-#: Angle of examples (rad).
-_ANGLE = pi / 6.0
+_FRIENDLY = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "rad/s": ("rpm", 30.0 / pi)}
+#: Examples of values by SI unit; 1 for other units.
+_EXAMPLES = {"m": 0.1, "rad": pi / 6.0}
 #: Column at which the explanations start.
 _COLUMN = 46
 
@@ -68,7 +68,7 @@ def example(read: Reader) -> Any:
     """Return an example of a value that a reader accepts; None if no example is known."""
     match read:
         case Quantity(unit=unit, below=below):
-            value = _ANGLE if unit == "rad" else 1.0 if below > 1.0 else 0.5 * below
+            value = _EXAMPLES.get(unit, min(1.0, 0.5 * below))
             return 1 if unit == "1" else in_words(value, unit)
         case Whole(least=lower):
             return 1 if lower is None else max(lower, 1)
@@ -80,7 +80,7 @@ def example(read: Reader) -> Any:
         case Range(item=Quantity(unit="1")):
             return [1, 2]
         case Range(item=Quantity(unit=unit)):
-            return [in_words(share * (_ANGLE if unit == "rad" else 1.0), unit) for share in (0.1, 1.0)]
+            return [in_words(share * _EXAMPLES.get(unit, 1.0), unit) for share in (0.1, 1.0)]
         case reader.flag:
             return True
     return None

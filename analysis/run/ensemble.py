@@ -12,7 +12,7 @@ from itertools import chain
 from math import prod
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, Unpack
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,8 +97,19 @@ class Ensemble:
     def __len__(self) -> int:
         return len(self.parameters)
 
-    def __getitem__(self, index: int) -> Trajectory:
-        """Return one run as a `Trajectory`; unlike `simulate`, a run that ended early has no row for its last configuration."""
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Trajectory]: ...
+
+    def __getitem__(self, index: int | slice) -> Trajectory | list[Trajectory]:
+        """Return one run as a `Trajectory`, or the runs of a slice as a list.
+
+        Unlike `simulate`, a run that ended early has no row for its last configuration.
+        """
+        if isinstance(index, slice):
+            return [self[n] for n in range(*index.indices(len(self)))]
         n = int(self.counts[index])
         if self.values is not None:
             values = self.values[index, :n]

@@ -138,6 +138,7 @@ def test_bits_do_not_depend_on_what_shares_a_vector(drive: str) -> None:
     assert [other.messages[n] for n in range(21)] == [one.messages[i] for i in order]
     alone = simulate_many([springs[3]], [inputs[3]], **options)
     assert np.array_equal(alone.states[0], one.states[3], equal_nan=True)
+    assert [run.parameters for run in one[-3:]] == springs[-3:]
 
 
 def test_lanes_pause_and_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -236,7 +236,13 @@ class Constraints:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TradeOffTable:
-    """The table ``[trade_off]``: arguments of `trade_off`."""
+    """The table ``[trade_off]``: arguments of `trade_off`.
+
+    Attributes
+    ----------
+    starts : int
+        Number of candidates of the scan from which a search is started, at each limit.
+    """
 
     over: Any = files.entry(files.Choice(OVER))
     limits: tuple[float, ...] = files.entry(files.Many(files.any_value, least=2))

@@ -589,6 +589,7 @@ def trade_off(
     ----------
     task : Task
     over : "size", "transmission" or "pin-force"
+        What is limited besides the error.
     limits : array_like, shape (n,)
         Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
     bounds, constraints, kinds, gears
