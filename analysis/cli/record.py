@@ -54,7 +54,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
 
     RECORD is a CSV file of times and positions after an impulse or a release. A decaying vibration with an offset is fitted to
     the turning points of the record by least squares; +- is the standard error. With dry friction the decrement grows from
-    cycle to cycle.
+    cycle to cycle. If the motion is damped so strongly that it has fewer than five turning points, the whole curve is fitted.
 
     \b
     Examples:
@@ -78,8 +78,9 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     moving = None if options["mass"] is None else quantity(options["mass"], si[0], "--mass")
     if moving is not None and moving <= 0.0:
         raise click.UsageError(f"--mass {options['mass']}: it must be above zero")
+    points = "samples" if decay.whole else "turning points"
     show_table(
-        f"{Path(record).name}: {len(decay.time)} turning points from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
+        f"{Path(record).name}: {len(decay.time)} {points} from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
         ("", "value", "+-", "unit"),
         [
             (name, f"{value:.6g}", f"{error:.2g}", its_unit)
@@ -87,7 +88,9 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
         ],
     )
     say(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)")
-    if not options["friction"]:
+    if decay.whole:
+        note("too few turning points: the whole curve is fitted, in which dry friction would count as damping")
+    elif not options["friction"]:
         with suppress(InputError):
             dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
             # more than noise and the approximation of the motion by waves can cause

@@ -60,7 +60,8 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     "--places",
     default=5,
     type=click.IntRange(min=0),
-    help="Number of values in the range at which all motions are sought, to find those that no branch leads to.",
+    help="Number of values in the range at which, and at the highest resonance, all motions are sought, to find those that no "
+    "branch leads to.",
 )
 @click.option(
     "--turns",

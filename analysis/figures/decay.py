@@ -1,4 +1,4 @@
-"""Plot a free decay: the record, its turning points and the fitted envelope."""
+"""Plot a free decay: the record, its turning points and the fitted envelope, or the fitted curve."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .style import COLOURS, Figure
 def plot_decay(
     decay: Decay, record: tuple[ArrayLike, ArrayLike] | None = None, *, unit: str = "", title: str = ""
 ) -> Figure:
-    """Plot the turning points of a free decay with their envelope, and the decrement of each cycle.
+    """Plot the turning points of a free decay with their envelope, and the decrement of each cycle, or the fitted curve.
 
     Parameters
     ----------
@@ -31,6 +31,10 @@ def plot_decay(
     curves = [] if record is None else [Curve(x=record[0], y=record[1], label="record", colour=COLOURS[0])]
     points: dict[str, Any] = {"line": "", "marker": "o", "colour": COLOURS[1]}
     fit: dict[str, Any] = {"line": "--", "colour": "0.35"}
+    if decay.whole:
+        curves.append(Curve(x=decay.time, y=decay.fitted, label="fit", **fit))
+        panel = Panel(x_label="time [s]", y_label=f"position [{unit}]" if unit else "position", curves=curves)
+        return plot_curves([panel], title=title)
     curves.append(Curve(x=decay.time, y=decay.position, label="turning points", **points))
     curves += [
         Curve(x=decay.time[side::2], y=decay.fitted[side::2], label="" if side else "fit", **fit) for side in (0, 1)

@@ -8,6 +8,9 @@ every half period T/2 = pi / omega_d, where q = exp(-delta / 2) and delta = pi c
 a whole cycle. Dry friction shortens each swing by the same length, the damper by the same percentage; friction does not change
 the period. Friction does change the acceleration at a turning point at the distance x from b: it is the acceleration due to
 the spring, times 1 + r / x before the turning point, and times 1 - r / x after it.
+
+A strongly damped motion has too few turning points: the whole curve x = b + exp(-s t) (C cos(omega_d t) + D sin(omega_d t)),
+where s = delta omega_d / (2 pi), is then fitted to all samples.
 """
 
 from __future__ import annotations
@@ -27,20 +30,23 @@ LEAST_SWING = 0.1
 _WINDOW = 1.0 / 6.0
 #: Rounds of the iteration between the friction and the waves, whose curvature jumps by an amount that depends on friction.
 _ROUNDS = 4
+#: Greatest residual of a fit of the whole curve, as a fraction of the record's range; number of samples that make the first
+#: guess; damping ratios of the guesses, and number of their frequencies.
+_MISFIT, _GUESSED, _RATIOS, _FREQUENCIES = 0.03, 400, (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8), 80
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decay:
-    """Fit of the turning points of a free decay; ``*_error`` are standard errors.
+    """Fit of a free decay; ``*_error`` are standard errors.
 
     Attributes
     ----------
     time, position : ndarray, shape (n,)
-        Times (s) and positions (in the record's unit) of the turning points.
+        Times (s) and positions (in the record's unit) of the turning points, or of all samples if ``whole``.
     fitted : ndarray, shape (n,)
-        Positions of the turning points by the fit.
+        Positions at these times by the fit.
     decrement : float
         Logarithmic decrement of a cycle.
     frequency : float
@@ -51,6 +57,8 @@ class Decay:
         Position of rest without friction, in the record's unit.
     residual : float
         Root mean square of ``position - fitted``, relative to the first amplitude.
+    whole : bool
+        Whether the whole curve was fitted, because a strongly damped motion has too few turning points.
     """
 
     time: NDArray[np.float64]
@@ -64,10 +72,12 @@ class Decay:
     friction_error: float
     offset: float
     residual: float
+    whole: bool = False
 
     def __repr__(self) -> str:
         return (
-            f"<Decay: {len(self.time)} turning points, damping ratio {self.damping_ratio:.6g} +- "
+            f"<Decay: {len(self.time)} {'samples' if self.whole else 'turning points'}, "
+            f"damping ratio {self.damping_ratio:.6g} +- "
             f"{self.damping_ratio_error:.2g}, natural frequency {self.natural_frequency:.6g} +- "
             f"{self.natural_frequency_error:.2g} rad/s>"
         )
@@ -93,7 +103,12 @@ class Decay:
 
     @property
     def cycle_decrements(self) -> NDArray[np.float64]:
-        """Logarithmic decrement of each cycle by itself: with dry friction it grows from cycle to cycle."""
+        """Logarithmic decrement of each cycle by itself: with dry friction it grows from cycle to cycle.
+
+        The array is empty if the whole curve was fitted.
+        """
+        if self.whole:
+            return np.empty(0)
         swings = np.abs(np.diff(self.position))
         return np.log(swings[:-2] / swings[2:])
 
@@ -121,7 +136,8 @@ def fit_decay(
     """Fit logarithmic decrement, damping ratio and natural frequency to a record of a free decay.
 
     The times of the turning points and the decay of their distances from a constant offset are fitted by least squares. Each
-    turning point is the vertex of a sine wave fitted to the samples near it, which averages noise.
+    turning point is the vertex of a sine wave fitted to the samples near it, which averages noise. If a record without friction
+    has one to four turning points, as with damping ratios above 0.15, the whole curve is fitted to all samples instead.
 
     Parameters
     ----------
@@ -153,11 +169,14 @@ def fit_decay(
             f"the least swing is {least_swing!r}: it must be between 0 and 1, a part of the record's range"
         )
     turns = _turning_points(x, least_swing * float(np.ptp(x)))
-    needed = 6 if friction else 5
+    if not friction and 0 < len(turns) < 5:
+        return _fit_curve(t, x)
+    needed, too = (6, " with friction") if friction else (1, "")
     if len(turns) < needed:
         raise InputError(
             f"the record has {len(turns)} turning points with swings above {least_swing:g} of its range: "
-            f"{needed} are needed{' with friction' if friction else ''}; a longer record, or a smaller least swing, has more"
+            f"{needed} {'are' if friction else 'is'} needed{too}; a longer record, or a smaller least swing, has more"
+            + ("; a strongly damped motion can be fitted without friction only" if friction and turns else "")
             + ("; is it the right column?" if not turns else "")
         )
     spaces = np.diff(t[turns])
@@ -187,6 +206,59 @@ def fit_decay(
         ]
         found = _fit(np.array(tops), friction)
     return found
+
+
+def _fit_curve(t: NDArray[np.float64], x: NDArray[np.float64]) -> Decay:
+    """Fit a damped vibration to all samples of a record that has few turning points."""
+    s, span, range_ = t - t[0], float(t[-1] - t[0]), float(np.ptp(x))
+
+    def waves(s: NDArray[np.float64], rate: float, frequency: float) -> NDArray[np.float64]:
+        fading = np.exp(-rate * s)
+        return np.column_stack([np.ones_like(s), fading * np.cos(frequency * s), fading * np.sin(frequency * s)])
+
+    def model(s: NDArray[np.float64], rate: float, frequency: float, *sizes: float) -> NDArray[np.float64]:
+        return np.asarray(waves(s, rate / span, frequency / span) @ np.array(sizes))
+
+    few = slice(None, None, 1 + len(s) // _GUESSED)
+    best, guess = np.inf, np.zeros(5)
+    for ratio in _RATIOS:
+        for frequency in np.geomspace(pi, 0.25 * pi * min(len(s), _GUESSED), _FREQUENCIES):
+            rate = ratio * frequency / sqrt(1.0 - ratio**2)
+            columns = waves(s[few], rate / span, frequency / span)
+            sizes = np.linalg.lstsq(columns, x[few] / range_, rcond=None)[0]
+            misfit = float(np.mean((columns @ sizes - x[few] / range_) ** 2))
+            if misfit < best:
+                best, guess = misfit, np.array([rate, frequency, *sizes])
+    try:
+        values, spread = curve_fit(model, s, x / range_, guess, method="trf", x_scale="jac", max_nfev=4000)
+    except RuntimeError as error:
+        raise InputError("no damped vibration fits the record") from error
+    rate, frequency, fitted = float(values[0]), float(values[1]), range_ * model(s, *values)
+    residual = float(np.sqrt(np.mean((x - fitted) ** 2)))
+    if not residual < _MISFIT * range_:
+        raise InputError(
+            f"the record has too few turning points for the decrement, and no damped vibration fits it within {_MISFIT:.0%} of "
+            f"its range, but within {residual / range_:.2%} only: it must begin where the mass moves freely, after the impulse "
+            "or the release"
+        )
+    if not (rate > 0.0 and np.isfinite(spread).all()):
+        raise InputError("the swings of the record do not decay: it must begin after the impulse, and run freely")
+    decrement = 2.0 * pi * rate / frequency
+    slope = np.array([1.0 / rate, -1.0 / frequency])  # of log(decrement) over rate and frequency
+    return Decay(
+        time=t,
+        position=x,
+        fitted=fitted,
+        decrement=decrement,
+        decrement_error=decrement * sqrt(float(slope @ spread[:2, :2] @ slope)),
+        frequency=frequency / span,
+        frequency_error=sqrt(float(spread[1, 1])) / span,
+        friction=0.0,
+        friction_error=0.0,
+        offset=range_ * float(values[2]),
+        residual=residual / (range_ * float(np.hypot(*values[3:]))),
+        whole=True,
+    )
 
 
 def _check_record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

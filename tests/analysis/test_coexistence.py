@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from analysis import Inputs, simulate
 from analysis.cli import main
 from analysis.figures import plot
+from analysis.linkages import linkage
 from analysis.numerics.continuation import ContinuationError
 from analysis.periodic import (
     Basins,
@@ -217,8 +218,28 @@ def test_speeds_to_avoid_know_a_motion_that_no_branch_leads_to_or_say_that_none_
     for found, known in ((response, False), (whole, True)):
         assert known == any(a.low < 950.0 * rpm < a.high for a in found.speeds_to_avoid)
         assert known != ("not sought" in repr(found))
-        assert known == ("all motions sought at 2 values of drive.speed only" in repr(found))
+        assert known == (f"all motions sought at {whole.sought} values of drive.speed only" in repr(found))
     assert "not sought" in plot(response).axes[0].get_legend().get_title().get_text()
+
+
+def test_an_isola_above_the_resonance_is_found_between_evenly_spaced_speeds() -> None:
+    """At resonance the damper alone balances the shaking: 4 V - 46 (3/4) V^3 + 120 (5/8) V^5 = 0.3 N, with V = w times the
+    amplitude, has three roots, of which two are on a curve 0.7 rad/s wide."""
+    built = linkage("falling-damping", ground={"A": (0, 0), "Q": (0.3, 0)})
+    built.body("crank", bar=("A", "B"), length=0.003, mass=0.1, inertia=1e-5)
+    built.body("yoke", points={"Y": (0, 0)}, mass=0.2)
+    built.body("block", points={"K": (0, 0)}, mass=1.0)
+    built.slide("G", body="yoke", on="ground", through="A").slide("H", body="block", on="ground", through="Q")
+    built.slot("S", pin="B", on="yoke", through="Y", direction="90 deg")
+    built.spring("shaking", between=("Y", "K"), stiffness=100.0, free=0.3)
+    built.spring("home", at="H", stiffness=900.0, damping=4.0, law="120*v**5 - 46*v**3")
+    built.freedom("crank", "A", speed=31.4).freedom("block", "H").mechanism()
+    whole = with_isolas(frequency_response("falling-damping", 25.0, 40.0, greatest_step=2e-2), greatest_step=2e-2)
+    (isola,) = (branch for branch in whole.branches if branch.closed)
+    small, _, large = sorted(root.real for root in np.roots([75.0, 0.0, -34.5, 0.0, 4.0, -0.3]) if not root.imag)
+    assert sorted(np.sqrt(1000.0) * top.amplitude for top in whole.maxima()) == pytest.approx([small, large], rel=5e-3)
+    # by shooting with a Runge-Kutta method of order 4
+    assert [isola.parameter.min(), isola.parameter.max()] == pytest.approx([31.2743, 31.9472], abs=2e-3)
 
 
 @pytest.mark.slow

@@ -147,7 +147,12 @@ T = np.linspace(0.0, 0.8, 401)
         (T, np.where(T > 0.4, np.nan, free(T)), "not finite"),
         (free(T), T, "time does not increase"),
         (T, ["high"] * len(T), "must be numbers"),
-        (T[:60], free(T[:60]), "turning points"),
+        (T[:20], free(T[:20]), "turning points"),
+        (
+            T,
+            np.where(T > 0.1, free(T, 40.0)[np.arange(len(T)) - 51], 0.02),
+            "it must begin where the mass moves freely",
+        ),
         (T, np.zeros(len(T)), "0 turning points"),
         (T, T, "0 turning points"),
         (T, free(T)[::-1], "do not decay"),
@@ -158,6 +163,27 @@ T = np.linspace(0.0, 0.8, 401)
 def test_what_is_no_decay(time: object, position: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         fit_decay(time, position)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 0.3, 0.4, 0.5])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_strong_damping_is_fitted_to_the_whole_curve(ratio: float, noise: float) -> None:
+    damping = 2.0 * ratio * sqrt(STIFFNESS * MASS)
+    x = 3.0 + free(T, damping) + 0.02 * noise * np.random.default_rng(1).standard_normal(len(T))
+    found = fit_decay(T, x)
+    assert found.whole
+    assert len(found.cycle_decrements) == 0
+    value, error = found.damping(MASS)
+    assert abs(value - damping) < 4.0 * error + 1e-6 * damping
+    assert error < 2.0 * noise * damping + 1e-6 * damping
+    stiffness, error = found.stiffness(MASS)
+    assert abs(stiffness - STIFFNESS) < 4.0 * error + 1e-6 * STIFFNESS
+    assert found.offset == pytest.approx(3.0, abs=1e-4)
+
+
+def test_strong_damping_with_friction_is_refused_with_a_way_out() -> None:
+    with pytest.raises(InputError, match="can be fitted without friction only"):
+        fit_decay(T, free(T, 30.0, 0.5), friction=True)
 
 
 @pytest.mark.parametrize("least", [0.0, 1.0, -0.1, float("nan")])
@@ -263,12 +289,20 @@ class TestCommand:
             _, output = self.run("record.csv", "--no-plot")
             assert ("as with dry friction" in output) == bool(friction)
 
+    def test_strong_damping(self) -> None:
+        np.savetxt("record.csv", np.column_stack([T, free(T, 40.0)]), delimiter=",", header="t [s],u [m]", comments="")
+        code, output = self.run("record.csv", "--mass", "0.6")
+        assert code == 0, output
+        assert "401 samples" in output
+        assert "the whole curve is fitted" in output
+        assert Path("out/record-decrement.png").exists()
+
     @pytest.mark.parametrize(
         ("options", "words"),
         [
             (("--position", "v"), "there is no column 'v' in record.csv"),
             (("--time", "u", "--position", "t"), "time does not increase"),
-            (("--from", "700 s"), "turning points"),
+            (("--from", "795 s"), "turning points"),
             (("--from", "9000 s"), "record is empty"),
             (("--unit", "kg"), "--unit"),
             (("--time-unit", "mm"), "--time-unit"),

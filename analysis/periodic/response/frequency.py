@@ -572,14 +572,33 @@ def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
 _SAME_POINT = 1e-6
 
 
+#: Distance of a maximum from an evenly spaced value, relative to the range, below which it is not searched as well.
+_SAME_VALUE = 0.01
+
+
+def _values_to_search(response: Response, places: int) -> list[float]:
+    """Return values of the parameter at which to seek all motions: evenly spaced, and the highest maxima of the coordinates."""
+    values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
+    reach = _SAME_VALUE * (response.high - response.low)
+    highest: dict[int, Extremum] = {}
+    for top in response.maxima():
+        if top.coordinate not in highest or top.amplitude > highest[top.coordinate].amplitude:
+            highest[top.coordinate] = top
+    for top in highest.values():
+        if all(abs(top.parameter - value) > reach for value in values):
+            values.append(top.parameter)
+    return sorted(values)
+
+
 def with_isolas(
     response: Response, *, places: int = 5, turns: int = 1, greatest_step: float = 5e-3, progress: bool = False
 ) -> Response:
     """Return a response with further branches: motions that are not connected to any of its branches, such as isolas.
 
-    All motions are sought at several values of the parameter; motions that exist only between these values are not found. From
-    each motion that lies on no branch, a new branch is followed in both directions until it closes or ends. Motions whose
-    deviations grow more than a thousandfold per turn are ignored.
+    All motions are sought at several values of the parameter, and at the highest resonance of each free coordinate, above which
+    isolas often lie. Motions that exist only between these values are not found. From each motion that lies on no
+    branch, a new branch is followed in both directions until it closes or ends. Motions whose deviations grow more than a
+    thousandfold per turn are ignored.
 
     Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling these
     motions still exist, increasingly unstable, over a range about ten times as wide, where the search can find them. They are
@@ -589,7 +608,7 @@ def with_isolas(
     ----------
     response : Response
     places : int
-        Number of values of the parameter, evenly spaced inside the range, at which all motions are sought.
+        Number of values of the parameter, evenly spaced inside the range, at which all motions are sought beside the maxima.
     turns : int
         Greatest number of turns (common periods) in the period of the motions that are sought.
     greatest_step, progress
@@ -614,11 +633,11 @@ def with_isolas(
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     motion.require_turns(turns)
     branches, problems = list(response.branches), list(response.problems)
+    values = _values_to_search(response, places)
     with (
         record_interrupts() as interrupted,
-        show_progress(progress, float(places * turns), "seeking closed branches") as show,
+        show_progress(progress, float(len(values) * turns), "seeking closed branches") as show,
     ):
-        values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
         search = _Search(
             response.family, response.low, response.high, greatest_step, lambda: bool(interrupted), branches, problems
         )
