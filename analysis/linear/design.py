@@ -35,9 +35,7 @@ else:
 
 
 #: Model that a design needs, in messages.
-_MODEL = (
-    "a LinearModel, such as linearise('table-3.1', rest.state, rest.inputs) with rest = find_equilibrium('table-3.1')"
-)
+_MODEL = "a LinearModel, such as linearise('table-3.1', rest.state, rest.inputs), rest = find_equilibrium('table-3.1')"
 
 
 class DesignError(LinkworkError):
@@ -117,10 +115,7 @@ class Design:
         return self.plant.loop(self.gains, self.integral_gain)
 
     def closed_loop(self, outputs: str | Sequence[str] | None = None) -> control.StateSpace:
-        """Return the closed loop from a disturbing force to the outputs with the given FMI names.
-
-        The default output is the controlled coordinate.
-        """
+        """Return the closed loop from a disturbing force to the named outputs, by default the controlled coordinate."""
         chosen = (self.coordinate,) if outputs is None else as_names(outputs)
         a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))
@@ -437,12 +432,6 @@ def _check_positive(name: str, value: float, unit: str) -> None:
 
 
 def check_period(period: float) -> None:
-    """Check that a sampling period (s) is finite and above zero.
-
-    Raises
-    ------
-    InputError
-        If the period is not a finite number greater than zero.
-    """
+    """Raise InputError if a sampling period (s) is not a finite number greater than zero."""
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"sampling period is {period} s: it must be a finite number greater than zero")

@@ -24,16 +24,8 @@ from ..mechanisms import InitialState, Parameters, find_mechanism, variable_unit
 from ..numerics import symbolic
 from ..run import Inputs, check_run, expressions, float_array, takes_published
 from ..units import Amount, in_si
-from .model import (
-    FloatArray,
-    Layout,
-    Modes,
-    layout,
-    linearise,
-    sample_channels,
-    vibration_grows,
-    without_dry_friction,
-)
+from . import model
+from .model import FloatArray, Modes, layout, sample_channels
 
 #: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom. The reach
 #: of an angle that a spring winds up is a turn to either side. With four free coordinates the grid is coarser.
@@ -143,13 +135,15 @@ class Equilibrium:
         The stiffness must be positive, as at a minimum of the potential energy. A load in the axes of a body or a force law
         that drives may still let a vibration grow; therefore no pole may have a positive real part either.
         """
-        balance = _Balance.build(self.parameters, self.inputs)
+        balance = _Balance(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         # loads in the axes of a body make the stiffness unsymmetric
         values = np.linalg.eigvals(free)
         if values.real.min() <= 1e-9 * np.abs(values).max():
             return False
-        return not vibration_grows(linearise(without_dry_friction(self.parameters), self.state, self.inputs).poles)
+        return not model.vibration_grows(
+            model.linearise(model.without_dry_friction(self.parameters), self.state, self.inputs).poles
+        )
 
     @property
     def potential(self) -> float:
@@ -168,7 +162,6 @@ class Equilibrium:
         return mechanism.equations.energy(self.state, self.parameters.constants()) - work
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
     """Equilibrium equations: generalised forces on the free degrees of freedom, divided by the mechanism's scales.
 
@@ -176,18 +169,8 @@ class _Balance:
     forces.
     """
 
-    parameters: Parameters
-    mechanism: Mechanism
-    inputs: Inputs
-    channels: FloatArray
-    modes: Modes
-    its: Layout  # in these modes; ``its.free`` has the free and the held degrees of freedom
-    free: list[int]  # indices, in ``its.free``, of the degrees of freedom that are not held
-    scale: FloatArray  # scales of the coordinates of ``its.free``
-
-    @classmethod
-    def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
-        mechanism = find_mechanism(parameters)
+    def __init__(self, parameters: Parameters, inputs: Inputs) -> None:
+        self.mechanism = mechanism = find_mechanism(parameters)
         check_run(mechanism, inputs, None)
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
@@ -199,23 +182,20 @@ class _Balance:
         for place, mode in enumerate(mechanism.modes):
             if any(mechanism.freedoms[n].mode is mode for n in held):
                 loose[place] = next((k for k, name in enumerate(mode.arguments) if name in forces), modes[place])
-        its = layout(mechanism, tuple(loose))
-        free = [place for place, n in enumerate(its.free) if n not in held]
-        if not free:
+        self.parameters, self.inputs, self.channels, self.modes = parameters, inputs, channels[0], tuple(loose)
+        #: In these modes; ``its.free`` has the free and the held degrees of freedom.
+        self.its = layout(mechanism, self.modes)
+        #: Indices, in ``its.free``, of the degrees of freedom that are not held.
+        self.free = [place for place, n in enumerate(self.its.free) if n not in held]
+        if not self.free:
             mode = mechanism.modes[0]
             raise InputError(
                 f"no freedom of the {mechanism.name} is free: there is no equilibrium to be found; "
                 f"{mode.arguments[0]}=0.0 instead of {mode.arguments[1]} frees one"
             )
-        scale = np.array(mechanism.error_scale(parameters, tuple(still[0].tolist())))[list(its.free)]
-        return cls(
-            parameters=parameters, mechanism=mechanism, inputs=inputs, channels=channels[0],
-            modes=tuple(loose), its=its, free=free, scale=scale,
-        )  # fmt: skip
-
-    @property
-    def constants(self) -> FloatArray:
-        return np.array([*self.parameters.constants(), 0.0])
+        #: Scales of the coordinates of ``its.free``.
+        self.scale = np.array(mechanism.error_scale(parameters, tuple(still[0].tolist())))[list(self.its.free)]
+        self.constants = np.array([*parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
         """Return the norms of the scaled forces on the free degrees of freedom at n configurations, shape (n,).
@@ -230,10 +210,7 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Find an equilibrium by Newton's method; a step is halved while the imbalance would grow.
-
-        Raises EquilibriumError if the method does not converge.
-        """
+        """Find an equilibrium by Newton's method, halving steps that raise the imbalance; EquilibriumError if it fails."""
         q, moved = guess.copy(), np.array(self.its.free)[self.free]
         before = self.imbalance(q[:, None])[0]
         for iteration in range(MOST_ITERATIONS):
@@ -270,10 +247,9 @@ class _Balance:
         self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
     ) -> Equilibrium:
         # `start` sets a freedom that is tied to another
-        applied = self.mechanism.equations.apply_inputs(
-            tuple(map(float, self.modes)), tuple(self.channels.tolist()), self.parameters.constants()
-        )
-        state = self.mechanism.equations.start(self._state(q), applied, self.parameters.constants())
+        equations, p = self.mechanism.equations, self.parameters.constants()
+        applied = equations.apply_inputs(tuple(map(float, self.modes)), tuple(self.channels.tolist()), p)
+        state = equations.start(self.state(q), applied, p)
         held = [(self.mechanism.freedoms[n].coordinate, k) for k, n in enumerate(self.its.free) if k not in self.free]
         return Equilibrium(
             parameters=self.parameters, coordinates=np.array(state[: len(q)]), inputs=self.inputs, stiffness=stiffness,
@@ -281,9 +257,10 @@ class _Balance:
         )  # fmt: skip
 
     def _words(self, q: FloatArray) -> str:
-        return self.mechanism.describe_state(self._state(q))
+        return self.mechanism.describe_state(self.state(q))
 
-    def _state(self, q: FloatArray) -> tuple[float, ...]:
+    def state(self, q: FloatArray) -> tuple[float, ...]:
+        """Return the state of the plant at rest with the coordinates q."""
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
@@ -329,7 +306,7 @@ def _balance_with_held(
             raise InputError(f"{name} is {value}: it must be a finite number")
         inputs = inputs.replace(**{commands[name].argument: 0.0})
         coordinates[commands[name].freedom] = value
-    return _Balance.build(parameters, inputs), coordinates
+    return _Balance(parameters, inputs), coordinates
 
 
 @takes_published()
@@ -426,8 +403,7 @@ def find_equilibrium(
             raise InputError(wanted)
         fixed = layout(balance.mechanism, tuple(balance.inputs.modes(balance.mechanism).values())).commanded
         start[list(fixed)] = coordinates[list(fixed)]
-        state = [*start.tolist(), *[0.0] * (balance.mechanism.size - len(start))]
-        balance.mechanism.check_assembly(state, parameters.constants())
+        balance.mechanism.check_assembly(balance.state(start), parameters.constants())
         return balance.solve(start)
     found = find_equilibria(parameters, inputs, held=held)
     if not found:

@@ -15,21 +15,9 @@ from linkwork.errors import AssemblyError, InputError, IntegrationError
 from linkwork.mechanism import Channel, Mechanism
 from linkwork.plant import Plant
 
+from .. import run
 from ..mechanisms import InitialState, Parameters, find_mechanism, variable_unit
-from ..run import (
-    FmuRun,
-    Inputs,
-    Trajectory,
-    align,
-    check_run,
-    complete_initial_state,
-    complete_inputs,
-    encode,
-    require_kind,
-    sample,
-    sample_times,
-    takes_published,
-)
+from ..run import FmuRun, Inputs, Trajectory, takes_published
 from ..units import Amount, in_si, si
 from .design import Design, check_period
 from .model import FloatArray
@@ -44,13 +32,7 @@ def saturate(force: float, limit: float) -> float:
 
 
 def check_limit(limit: float) -> None:
-    """Check that the limit of a force (N) is above zero.
-
-    Raises
-    ------
-    InputError
-        If the limit is not greater than zero.
-    """
+    """Check that the limit of a force (N) is above zero. Raises InputError if the limit is not greater than zero."""
     if not limit > 0.0:
         raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
 
@@ -66,20 +48,14 @@ def peak(values: FloatArray) -> float:
 
 
 class SampledController:
-    """A design as a sampled controller: it measures the state, computes the force, and holds the force for a period.
+    """A design as a sampled controller: it measures the state, computes the force, and holds the force for a period (s).
 
-    Parameters
-    ----------
-    design : Design
-    period : float
-        Sampling period (s).
-    limit : float
-        Largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
+    ``limit`` is the largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
     """
 
     @in_si(period="s")
     def __init__(self, design: Design, period: Amount, *, limit: Amount = inf) -> None:
-        require_kind(design, Design, "design", "what design_lqr, design_pid or design_pi returns")
+        run.require_kind(design, Design, "design", "what design_lqr, design_pid or design_pi returns")
         limit = si(limit, variable_unit(design.model.mechanism, design.channel), "limit")
         check_period(period)
         check_limit(limit)
@@ -199,13 +175,7 @@ class LoopResult:
 
     @in_si(window="s")
     def end(self, window: Amount) -> NDArray[np.bool_]:
-        """Return a mask of the samples in a window of given length (s) at the end of the run.
-
-        Raises
-        ------
-        InputError
-            If the run ended early.
-        """
+        """Return a mask of the samples in a window of given length (s) at the end; raise InputError if the run ended early."""
         if self.status:
             raise InputError(f"the run did not reach its end: {self.message}")
         return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
@@ -328,7 +298,7 @@ class _DrivenPlant:
 
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
-        self._encoded = align(encode(inputs, mechanism), times)
+        self._encoded = run.align(run.encode(inputs, mechanism), times)
         self._laws = self._encoded.source.laws.copy()
         self.modes = self._encoded.modes
         self.rows: list[Sequence[float]] = []
@@ -336,7 +306,8 @@ class _DrivenPlant:
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
         """Return all inputs for the step from ``time`` to ``ahead`` by FMI name, with 0 for the controller's force."""
         x = np.array([*measured, 0.0, 0.0])
-        return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
+        values = run.sample(self._encoded, time, x, self._laws, ahead=ahead)
+        return dict(zip(self.mechanism.input_names, values.tolist()))
 
 
 class _InProcess(_DrivenPlant):
@@ -386,7 +357,7 @@ def find_channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is not a force on a freedom of the {mechanism.name}")
 
 
-@takes_published(inputs=complete_inputs, initial=complete_initial_state)
+@takes_published(inputs=run.complete_inputs, initial=run.complete_initial_state)
 @in_si(stop_time="s")
 def control_loop(
     parameters: Parameters,
@@ -434,13 +405,13 @@ def control_loop(
         If the links cannot be joined at the start.
     """
     mechanism = find_mechanism(parameters)
-    inputs, initial = check_run(mechanism, inputs, initial)
+    inputs, initial = run.check_run(mechanism, inputs, initial)
     channel = find_channel(mechanism, controller.channel)
     if channel.argument in inputs:
         raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
     # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
-    times = sample_times(stop_time, controller.period)
+    times = run.sample_times(stop_time, controller.period)
     if fmu is None:
         inner = _InProcess(mechanism, inputs, controller.channel, times)
         first = inner.inputs(float(times[0]), float(times[1]), mechanism.state(initial)[:-2])
@@ -471,7 +442,5 @@ def control_loop(
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
     """Return the largest difference (m) between the controlled coordinates of two runs of the same length."""
     if first.time.shape != second.time.shape:
-        raise InputError(
-            f"runs of {len(first.time)} and {len(second.time)} samples: both runs must have the same number"
-        )
+        raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: both must have the same number")
     return float(np.abs(first.position - second.position).max())

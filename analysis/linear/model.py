@@ -74,35 +74,28 @@ class Layout:
 def layout(mechanism: Mechanism, modes: Modes) -> Layout:
     """Return the layout of a mechanism in given modes: free and commanded degrees of freedom, and acting forces."""
     names = {mode.name: mode.arguments[value] for mode, value in zip(mechanism.modes, modes)}
+    channels = mechanism.channels
 
     def acts(number: int) -> bool:
-        channel = mechanism.channels[number]
+        channel = channels[number]
         mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
         return mode is None or names[mode.name] == channel.argument
 
-    acting = [n for n in range(len(mechanism.channels)) if acts(n)]
-    kinds = {n: mechanism.channels[n].kind for n in acting}
-    driven = {
-        kind: {mechanism.channels[n].freedom for n in acting if kinds[n] == kind} for kind in ("force", "command")
-    }
+    acting = [n for n in range(len(channels)) if acts(n)]
+    driven = {kind: {channels[n].freedom for n in acting if channels[n].kind == kind} for kind in ("force", "command")}
     freedoms = range(len(mechanism.freedoms))
     commanded = tuple(n for n in freedoms if n in driven["command"])
     free = tuple(
         n for n in freedoms if n not in commanded and (mechanism.freedoms[n].mode is None or n in driven["force"])
     )
-    forces = tuple(n for n in acting if kinds[n] == "force")
-    inputs = [mechanism.channels[n].name for n in forces]
+    forces = tuple(n for n in acting if channels[n].kind == "force")
+    inputs = [channels[n].name for n in forces]
     for n in commanded:
         inputs += [_channel_name(mechanism, n, "rate"), _channel_name(mechanism, n, "command")]
         inputs.append(mechanism.freedoms[n].coordinate)
-    names_of = [mechanism.freedoms[n] for n in free]
-    return Layout(
-        free=free,
-        commanded=commanded,
-        forces=forces,
-        input_names=tuple(inputs),
-        state_names=tuple([f.coordinate for f in names_of] + [f.rate for f in names_of]),
-    )
+    moving = [mechanism.freedoms[n] for n in free]
+    states = tuple([f.coordinate for f in moving] + [f.rate for f in moving])
+    return Layout(free=free, commanded=commanded, forces=forces, input_names=tuple(inputs), state_names=states)
 
 
 def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
@@ -116,11 +109,8 @@ def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
     x, _, _, p = traces.symbols
     of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
     integrals = casadi.which_depends(traces.outputs, of_the_run, 1, True)
-    found = {
-        name: "an integral over the run, not a function of the state"
-        for name, integral in zip(mechanism.output_names, integrals)
-        if integral
-    }
+    reason = "an integral over the run, not a function of the state"
+    found = {name: reason for name, integral in zip(mechanism.output_names, integrals) if integral}
     return found | {name: "zero everywhere" for name in mechanism.output_names if name == "closure.residual"}
 
 
@@ -289,15 +279,8 @@ class LinearModel(Matrices):
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
         """Return the FMI name of a force that acts on a free degree of freedom, and the index of this degree of freedom.
 
-        Parameters
-        ----------
-        name : str, optional
-            FMI name of the force; by default the force on the last free degree of freedom, for a five-bar ``slider.force``.
-
-        Raises
-        ------
-        LinearModelError
-            If there is no such force.
+        By default it is the force on the last free degree of freedom, for a five-bar ``slider.force``. Raises LinearModelError
+        if there is no force of the given name.
         """
         mechanism, its = self.mechanism, self.layout
         channels = [mechanism.channels[n] for n in its.forces if mechanism.channels[n].freedom in its.free]
@@ -312,22 +295,10 @@ class LinearModel(Matrices):
     ) -> control.StateSpace:
         """Convert the model to a state space of python-control.
 
-        Parameters
-        ----------
-        outputs, inputs : str or sequence of str, optional
-            FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs.
-
-        Returns
-        -------
-        control.StateSpace
-            Its signals have the FMI names with underscores for dots (`signal_name`), as python-control requires.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such input or output.
-        LinearModelError
-            If a linear model does not have one of the outputs (`missing_outputs`).
+        Its signals have the FMI names with underscores for dots (`signal_name`), as python-control requires. ``outputs`` and
+        ``inputs`` are FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs. Raises
+        UnknownNameError if there is no such input or output; LinearModelError if a linear model does not have one of the
+        outputs (`missing_outputs`).
         """
         chosen = self.input_names if inputs is None else as_names(inputs)
         wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else as_names(outputs)
@@ -411,10 +382,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """Extend states, shape (n, 2 f), to full states, (n, 2 f + 2), by zeros for work dissipated and supplied.
-
-    Full states are returned unchanged.
-    """
+    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zeros for work dissipated and supplied; keep full states."""
     message = f"the states are {states!r}: they must be numbers in SI, such as the state of an Equilibrium"
     array, n = np.atleast_2d(float_array(states, message)), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
@@ -488,11 +456,5 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     if len(states) != 1:
         raise InputError(f"{len(states)} states: linearise takes one state; linearise_orbit takes many")
     modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)
-    arrays = evaluate(parameters, modes, states, channels)
-    return LinearModel(
-        parameters=parameters,
-        modes=modes,
-        state=states[0],
-        channels=channels[0],
-        **{name: a[0] for name, a in arrays.items()},
-    )
+    arrays = {name: array[0] for name, array in evaluate(parameters, modes, states, channels).items()}
+    return LinearModel(parameters=parameters, modes=modes, state=states[0], channels=channels[0], **arrays)

@@ -19,28 +19,14 @@ from linkwork.errors import InputError
 from linkwork.integrate import UNDEFINED
 from linkwork.mechanism import Mechanism
 
+from .. import run
 from ..mechanisms import InitialState, Parameters, find_mechanism
-from ..run import (
-    InductionMotor,
-    Inputs,
-    check_run,
-    complete_initial_state,
-    complete_inputs,
-    start_ratio,
-    takes_published,
-)
+from ..numerics.boundaries import find_minimum
+from ..run import InductionMotor, Inputs, check_run, complete_initial_state, complete_inputs, takes_published
 from ..units import RAD_S_PER_RPM
+from . import model
 from .equilibrium import Equilibrium, find_equilibrium
-from .model import (
-    ROUNDING,
-    FloatArray,
-    Matrices,
-    evaluate,
-    layout,
-    sample_channels,
-    vibration_grows,
-    without_dry_friction,
-)
+from .model import FloatArray, Matrices, evaluate, layout, sample_channels
 from .periodic import common_period
 
 #: Likeness (from 0 to 1) of a mode shape to the known modes below which it is that of a new mode.
@@ -77,9 +63,8 @@ class NaturalModes:
     shares: FloatArray
 
     def __repr__(self) -> str:
-        spans = (
-            f"{column.min():.6g} to {column.max():.6g}" for column in self._per_mode(self.frequencies / RAD_S_PER_RPM)
-        )
+        speeds = self._per_mode(self.frequencies / RAD_S_PER_RPM)
+        spans = (f"{column.min():.6g} to {column.max():.6g}" for column in speeds)
         words = f"natural frequencies [rpm] {', '.join(spans)}" if self.frequencies.shape[1] else "nothing vibrates"
         unstable = f", {self.unstable} of them unstable" if self.unstable else ""
         return (
@@ -105,7 +90,7 @@ class NaturalModes:
     @property
     def unstable(self) -> int:
         """Number of positions of the cranks at which the equilibrium is unstable: a pole has a positive real part."""
-        return int(np.sum(vibration_grows(self.poles)))
+        return int(np.sum(model.vibration_grows(self.poles)))
 
     @staticmethod
     def _per_mode(values: FloatArray) -> list[FloatArray]:
@@ -155,7 +140,7 @@ def natural_modes(
     inputs, initial = check_run(mechanism, inputs, initial)
     if samples < 1:
         raise InputError(f"samples is {samples}: it must be at least 1")
-    parameters = without_dry_friction(parameters)
+    parameters = model.without_dry_friction(parameters)
     speeds = _held_speeds(mechanism, inputs, initial)
     if set(layout(mechanism, tuple(inputs.modes(mechanism).values())).free) <= speeds.keys():
         forces = [c.argument for c in mechanism.channels if c.kind == "force" and speeds.get(c.freedom) == 0.0]
@@ -197,11 +182,7 @@ def _check_gap(mechanism: Mechanism, one: Equilibrium, other: Equilibrium) -> No
             return float(mechanism.equations.clearance(state(share), idle, p))
         return 0.0
 
-    share, width = 0.5, 0.5
-    while width > 1e-6:
-        around = np.linspace(max(share - width, 0.0), min(share + width, 1.0), 9).tolist()
-        share, width = min(around, key=clearance), 0.25 * width
-    mechanism.check_assembly(state(share), p)
+    mechanism.check_assembly(state(find_minimum(clearance, 0.0, 1.0, samples=9, tolerance=1e-6)[0]), p)
 
 
 def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int, float]:
@@ -224,7 +205,7 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int
     motors = {
         c.freedom for c in mechanism.channels for part in inputs.parts(c.argument) if isinstance(part, InductionMotor)
     }
-    return {n: float(start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
+    return {n: float(run.start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
 
 
 def _pair(likeness: FloatArray) -> Iterable[tuple[int, int]]:
@@ -242,7 +223,7 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
     frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
     known = np.zeros((size, size), dtype=complex)  # column k: the shape in which mode k oscillated last, or zeros
     for j, (poles, mass) in enumerate(zip(values, matrices.M)):
-        oscillating = np.flatnonzero(poles.imag > ROUNDING * np.abs(poles).max())
+        oscillating = np.flatnonzero(poles.imag > model.ROUNDING * np.abs(poles).max())
         oscillating = oscillating[np.argsort(np.abs(poles[oscillating]))]
         shapes = vectors[j, :size, oscillating].T
         energies = (shapes.conj() * (mass @ shapes)).real

@@ -19,17 +19,8 @@ from ..mechanisms import Parameters, find_mechanism
 from ..numerics.fourier import trigonometric
 from ..run import Inputs, check_run, speed_ratio, takes_published
 from ..units import Amount, in_si
-from .model import (
-    FloatArray,
-    LinearModel,
-    LinearModelError,
-    Matrices,
-    Modes,
-    evaluate,
-    full_states,
-    layout,
-    sample_channels,
-)
+from . import model
+from .model import FloatArray, LinearModel, Matrices, Modes, evaluate, full_states
 
 #: Least number of samples of a period.
 LEAST_SAMPLES = 16
@@ -101,13 +92,8 @@ class PeriodicModel(Matrices):
     def _model(self, reduce: Callable[[FloatArray], FloatArray]) -> LinearModel:
         own = ("parameters", "modes")
         arrays = {f.name: reduce(getattr(self, f.name)) for f in fields(Matrices) if f.name not in own}
-        return LinearModel(
-            parameters=self.parameters,
-            modes=self.modes,
-            state=reduce(self.states),
-            channels=reduce(self.channels),
-            **arrays,
-        )
+        arrays |= {"state": reduce(self.states), "channels": reduce(self.channels)}
+        return LinearModel(parameters=self.parameters, modes=self.modes, **arrays)
 
     @property
     def times(self) -> FloatArray:
@@ -136,19 +122,14 @@ class PeriodicModel(Matrices):
         """Return the mean rates of all f degrees of freedom: whole turns per period for cyclic ones, zero for the others."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
-        return (
-            np.array([f.period * round(w / f.period) if f.period else 0.0 for f, w in zip(freedoms, way)]) / self.period
-        )
+        turned = [f.period * round(w / f.period) if f.period else 0.0 for f, w in zip(freedoms, way)]
+        return np.array(turned) / self.period
 
     def check(self) -> None:
         """Check that the free coordinates and their rates fit together: each rate is the derivative of its coordinate.
 
-        The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled.
-
-        Raises
-        ------
-        InputError
-            If a rate is not the derivative of its coordinate; the message names the coordinate.
+        The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled. Raises
+        InputError if a rate is not the derivative of its coordinate; the message names the coordinate.
         """
         mechanism, n, secular = self.mechanism, len(self), self._mean_rates()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -169,12 +150,7 @@ class PeriodicModel(Matrices):
         """Check that the samples resolve dry friction: compare their mean of the trace of A with that of many more samples.
 
         Friction makes A large for the short time in which a rate passes through zero, which a sample hits or misses. Minus the
-        mean of the trace is the mean decay rate.
-
-        Raises
-        ------
-        InputError
-            If the mean decay rates differ.
+        mean of the trace is the mean decay rate. Raises InputError if the mean decay rates differ.
         """
         if not any(getattr(self.parameters, field_name(name)) for name in self.mechanism.names("friction")):
             return
@@ -195,13 +171,9 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the
-        model has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it.
-
-        Raises
-        ------
-        LinearModelError
-            If SciPy's method fails.
+        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the model
+        has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it. Raises LinearModelError if SciPy's
+        method fails.
         """
         from scipy.integrate import solve_ivp  # takes a fifth of a second
 
@@ -216,7 +188,7 @@ class PeriodicModel(Matrices):
             atol=tolerance,
         )
         if not result.success:
-            raise LinearModelError(f"the monodromy matrix could not be integrated: {result.message}")
+            raise model.LinearModelError(f"the monodromy matrix could not be integrated: {result.message}")
         return result.y[:, -1].reshape(size, size)
 
 
@@ -274,17 +246,19 @@ def linearise_orbit(
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"period is {period} s: it must be a finite number greater than zero")
     if not isinstance(motion, Orbit):
-        modes, channels = sample_channels(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
+        modes, channels = model.sample_channels(
+            mechanism, inputs, period * np.arange(len(states)) / len(states), states
+        )
     arrays = evaluate(parameters, modes, states, channels)
-    model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
-    model.check()
-    model.check_resolution()
-    return model
+    found = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
+    found.check()
+    found.check_resolution()
+    return found
 
 
 def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     """Return the time of one turn (s) of the first cyclic coordinate with a constant commanded speed."""
-    for n in layout(mechanism, modes).commanded:
+    for n in model.layout(mechanism, modes).commanded:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
         if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
             return mechanism.freedoms[n].period / abs(speed)

@@ -25,13 +25,7 @@ AT_REST = 1e-6
 class _Linear:
     """Linear model as the plant of a loop: simulates deviations from the model's equilibrium or periodic motion."""
 
-    def __init__(
-        self,
-        model: LinearModel | PeriodicModel,
-        channel: str,
-        averaged: bool,
-        deviation: FloatArray,
-    ) -> None:
+    def __init__(self, model: LinearModel | PeriodicModel, channel: str, averaged: bool, deviation: FloatArray) -> None:
         one = model if isinstance(model, LinearModel) else model.mean()
         self.mechanism, self.places = one.mechanism, one.places
         n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)

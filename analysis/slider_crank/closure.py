@@ -231,19 +231,9 @@ def close(
 def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
     """Close the loop by continuation: start the first point from the planar slider-crank, every other from the point before.
 
-    The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
-
-    Parameters
-    ----------
-    parameters : SliderCrankParameters
-        The mechanism.
-    crank_angle, shift : array_like
-        theta1 (rad) and S1 (m) in the order of the motion, numbers or arrays of shape (n,).
-
-    Raises
-    ------
-    InputError, AssemblyError, ClosureError
-        As `close`; a step that would change the assembly is a ClosureError.
+    The rod then turns from point to point without spin. ``crank_angle`` (rad) and ``shift`` (m) are theta1 and S1 in the order
+    of the motion, numbers or arrays of shape (n,). The points must be close to each other, by 20 degrees or less. For the
+    errors raised see `close`; a step that would change the assembly is a ClosureError.
     """
     th, s1 = broadcast_points(crank_angle, shift)
     points: list[Closure] = []
@@ -297,9 +287,8 @@ def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatAr
     columns = 0.5 * (trace[..., None, None] * np.eye(3) - product) @ screws
     matrix = np.concatenate([columns.real, columns.dual / length], -2)
     error = axial(product)
-    return cast(
-        FloatArray, np.linalg.solve(matrix, -np.concatenate([error.real, error.dual / length], -1)[..., None])[..., 0]
-    )
+    right = -np.concatenate([error.real, error.dual / length], -1)
+    return cast(FloatArray, np.linalg.solve(matrix, right[..., None])[..., 0])
 
 
 def _rotation(vector: Array) -> Array:
@@ -385,10 +374,7 @@ class Settled:
 
 
 def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
-    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and the joint screws of the unknowns in frame 1.
-
-    The screws have shape (n, 3, 5).
-    """
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and their joint screws in frame 1, (n, 3, 5)."""
     zero = np.zeros_like(th)
     pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
     turned = pin @ about_k(q[:, 0])

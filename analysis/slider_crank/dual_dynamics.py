@@ -125,10 +125,8 @@ def rates(
     """
     n = closure.crank_angle.size
     w, v = array_per_angle("speed", speed, n), array_per_angle("shift_velocity", shift_velocity, n)
-    e, a = (
-        array_per_angle("acceleration", acceleration, n),
-        array_per_angle("shift_acceleration", shift_acceleration, n),
-    )
+    e = array_per_angle("acceleration", acceleration, n)
+    a = array_per_angle("shift_acceleration", shift_acceleration, n)
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -190,22 +188,14 @@ def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
     crank = np.zeros((3, 3))
     crank[2] = crank[:, 2] = -p.crank_product_xz, -p.crank_product_yz, p.crank_inertia
     transverse = p.rod_inertia + p.rod_mass * p.rod_cog_distance**2
+
+    def body(mass: float, *centre: float, inertia: FloatArray) -> Binor:
+        return Binor(mass=mass, moment=mass * np.array(centre), inertia=inertia)
+
     return (
-        Binor(
-            mass=p.crank_mass,
-            moment=p.crank_mass * np.array([p.crank_cog_x, p.crank_cog_y, p.crank_cog_z]),
-            inertia=crank,
-        ),
-        Binor(
-            mass=p.rod_mass,
-            moment=p.rod_mass * np.array([p.rod_cog_distance, 0.0, 0.0]),
-            inertia=np.diag([0.0, transverse, transverse]),
-        ),
-        Binor(
-            mass=p.slider_mass,
-            moment=p.slider_mass * np.array([p.slider_cog_x, p.slider_cog_y, p.slider_cog_z]),
-            inertia=np.zeros((3, 3)),
-        ),
+        body(p.crank_mass, p.crank_cog_x, p.crank_cog_y, p.crank_cog_z, inertia=crank),
+        body(p.rod_mass, p.rod_cog_distance, 0.0, 0.0, inertia=np.diag([0.0, transverse, transverse])),
+        body(p.slider_mass, p.slider_cog_x, p.slider_cog_y, p.slider_cog_z, inertia=np.zeros((3, 3))),
     )
 
 
@@ -244,14 +234,13 @@ def joint_loads(closure: Closure, *, torque: Any = None, slider_force: Any = Non
     matrix, load = _equations(closure, moving, length)
     # the moment equation of the rod about its own line is always satisfied
     kept = np.delete(np.arange(18), 9)
-    given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = array_per_angle("torque" if torque is not None else "slider_force", value, n) / (
-        length if given == 5 else 1.0
-    )
+    if torque is not None:
+        given, known = 5, array_per_angle("torque", torque, n) / length
+    else:
+        given, known = 17, array_per_angle("slider_force", slider_force, n)
     free = np.delete(np.arange(18), given)
-    unknown = np.linalg.solve(
-        matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
-    )[..., 0]
+    right = load[:, kept] - known[:, None] * matrix[:, kept, given]
+    unknown = np.linalg.solve(matrix[:, kept[:, None], free], right[..., None])[..., 0]
     f = np.insert(unknown, given, known, axis=-1)
     guide = closure.guide_frame.real
     return JointLoads(
@@ -289,14 +278,11 @@ def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArr
     # and f3 (erratum 5) and the centres of mass (erratum 6) as Newton's law has them
     frames = (closure.crank_frame, closure.rod_frame, closure.guide_frame)
     gravity = Dual(np.zeros(3), np.array([p.gravity_x, p.gravity_y, p.gravity_z]))
+    velocities = motion.crank, motion.rod, motion.slider
+    changes = motion.crank_rate, motion.rod_rate, motion.slider_rate
     needed = [
         binor.rate(apply(body.T, velocity), apply(body.T, rate)) - binor.momentum(apply(Dual(body.real).T, gravity))
-        for binor, body, velocity, rate in zip(
-            binors(p),
-            frames,
-            (motion.crank, motion.rod, motion.slider),
-            (motion.crank_rate, motion.rod_rate, motion.slider_rate),
-        )
+        for binor, body, velocity, rate in zip(binors(p), frames, velocities, changes)
     ]
     pin, front = _ball_frames(closure)
     ground = join(forces[..., :2], moments[..., :2], forces[..., 2:], moments[..., 2:])
@@ -369,11 +355,8 @@ class Comparison:
 def compare(turn: ForceTurn) -> Comparison:
     """Compute motion and forces of a turn again by dual matrices and compare them with vector mechanics.
 
-    Raises
-    ------
-    InputError
-        If the slider's force is sought for a crank that a groove in its shaft shifts (the dual method does not cover this
-        case), or if the slider's force is determined at none of the angles.
+    Raises InputError if the slider's force is sought for a crank that a groove in its shaft shifts (the dual method does not
+    cover this case), or if the slider's force is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):
@@ -394,9 +377,8 @@ def compare(turn: ForceTurn) -> Comparison:
     }
     motion = rates(closure, **moving)
     # the slider force of the dual method is the whole force along the guide, with spring, damper and friction
-    pushed = plant_functions().slider_resistance(
-        closure.slider_position, motion.slider_velocity, 0.0, turn.parameters.constants()
-    )
+    p = turn.parameters.constants()
+    pushed = plant_functions().slider_resistance(closure.slider_position, motion.slider_velocity, 0.0, p)
     if sought:
         loads = joint_loads(closure, torque=turn.torque.data[good], **moving)
     else:

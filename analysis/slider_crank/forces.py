@@ -36,18 +36,9 @@ from ..display import format_range
 from ..numerics.tracing import ReboundFunctions
 from ..run import complete_speed, float_array, require_kind, takes_published
 from ..units import Amount, in_si
-from . import mobility
+from . import mobility, quantities
 from .mobility import DeadCentre
-from .quantities import (
-    DEAD_CENTRE,
-    JOINTS,
-    FloatArray,
-    MaskedArray,
-    array_per_angle,
-    check_joint,
-    masked_array,
-    unit_table,
-)
+from .quantities import JOINTS, FloatArray, MaskedArray, array_per_angle, masked_array
 from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
 #: Default number of angles over the turn: one for every degree, both ends included.
@@ -285,7 +276,7 @@ class ForceTurn:
         InputError
             If there is no such vector or frame.
         """
-        check_joint(name, frame)
+        quantities.check_joint(name, frame)
         ground = self._joints[name]
         if frame == 1:
             return ground.copy()
@@ -305,17 +296,10 @@ class ForceTurn:
     def columns(self, units: str = "SI") -> dict[str, FloatArray]:
         """Return all quantities as columns of a file, by name with unit; masked values are NaN, the last two columns say why.
 
-        Parameters
-        ----------
-        units : str
-            "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them.
-
-        Raises
-        ------
-        InputError
-            If there are no such units.
+        ``units`` is "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them. Raises InputError if
+        there are no such units.
         """
-        known = unit_table(units)
+        known = quantities.unit_table(units)
         parts: list[tuple[str, str, Any]] = [
             ("crank angle", "rad", self.angle),
             ("shift", "m", self.shift),
@@ -414,9 +398,8 @@ def force_turn(
     w, e = array_per_angle("crank_speed", crank_speed, n), array_per_angle("crank_acceleration", crank_acceleration, n)
     known, value = ("load", 0.0 if load is None else load) if torque is None else ("torque", torque)
     given = array_per_angle(known, value, n)
-    moving = ShiftMotion(
-        *(array_per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
-    )
+    shifts = shift.at(th, w, e)._asdict()
+    moving = ShiftMotion(*(array_per_angle(f"the shift law's {name}", x, n) for name, x in shifts.items()))
     f, p = plant_functions(), with_groove(parameters.constants(), shift)
     reached = f.assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
@@ -428,11 +411,14 @@ def force_turn(
         found = solve(f, p, th, moving, w, e, given=given, torque=torque is not None, groove=has_shaft_groove(shift))
     n, m, r = th.size, found.motion, found.reactions
     never = np.zeros(n, dtype=bool)
-    dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1
+    dead = never if torque is None else np.abs(found.ratio) <= quantities.DEAD_CENTRE * p.a1
 
     def scalar(values: Any, where: NDArray[np.bool_] = dead) -> MaskedArray:
         return masked_array(np.broadcast_to(values, (n,)), where)
 
+    # the moment on the guide does not depend on the load
+    masks = {name: (never if name == "guide_moment" else dead)[:, None] for name in JOINTS}
+    joints = {name: masked_array(_stack_components(getattr(r, name), n), mask) for name, mask in masks.items()}
     return ForceTurn(
         parameters=parameters,
         law=shift,
@@ -452,15 +438,7 @@ def force_turn(
         applied_axial_force=scalar(m.force),
         ratio=found.ratio,
         unreachable=unreachable,
-        # the moment on the guide does not depend on the load
-        _joints=MappingProxyType(
-            {
-                name: masked_array(
-                    _stack_components(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None]
-                )
-                for name in JOINTS
-            }
-        ),
+        _joints=MappingProxyType(joints),
         _position=found.position,
     )
 

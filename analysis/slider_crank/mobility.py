@@ -93,13 +93,7 @@ class PeriodicShift:
 
 @in_si(shift="m")
 def constant_shift(shift: Amount) -> PeriodicShift:
-    """Return the law of a crank held at the shift S1 (m).
-
-    Raises
-    ------
-    InputError
-        If ``shift`` is not finite.
-    """
+    """Return the law of a crank held at the shift S1 (m); raise InputError if ``shift`` is not finite."""
     if not isfinite(shift):
         raise InputError(f"the shift is {shift!r} m: it must be a finite number")
     return PeriodicShift(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
@@ -109,21 +103,15 @@ def constant_shift(shift: Amount) -> PeriodicShift:
 def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     """Return the law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
-    Raises
-    ------
-    ParameterError
-        If alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that many turns.
+    Raises ParameterError if alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that
+    many turns.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
     if abs(float(ratio) - p.ratio) > 1e-12 * max(1.0, abs(p.ratio)):
         raise ParameterError("groove.ratio", p.ratio, f"repeat after at most {_MOST_TURNS} turns of the crank")
-    return PeriodicShift(
-        at=lambda th: kinematics.groove(th, p),
-        rate=abs(p.amplitude * p.ratio),
-        curvature=abs(p.amplitude * p.ratio * p.ratio),
-        turns=ratio.denominator,
-    )
+    rate, curvature, turns = abs(p.amplitude * p.ratio), abs(p.amplitude * p.ratio * p.ratio), ratio.denominator
+    return PeriodicShift(at=lambda th: kinematics.groove(th, p), rate=rate, curvature=curvature, turns=turns)
 
 
 class Margin(NamedTuple):
@@ -443,10 +431,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """Find the `ranges` of crank angles in which a mechanism can be assembled; there is at least one.
 
-    Raises
-    ------
-    AssemblyError
-        If there is no such range; the message gives the least missing length of the rod.
+    Raises AssemblyError if there is no such range; the message gives the least missing length of the rod.
     """
     found = ranges(parameters, law)
     if not found:

@@ -128,15 +128,7 @@ class MonteCarlo:
     def notes(self, units: str = "SI") -> tuple[str, ...]:
         """Return sentences about samples that cannot be assembled, poles, and failures of the linear estimate.
 
-        Parameters
-        ----------
-        units : str
-            One of `UNITS`. With "SI" lengths are in mm.
-
-        Raises
-        ------
-        InputError
-            If there are no such units.
+        ``units`` is one of `UNITS`; with "SI" lengths are in mm. Raises InputError if there are no such units.
         """
         known, turn = shown_units(units), self.turn
         found = []
@@ -174,13 +166,7 @@ class MonteCarlo:
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def standard_error(self, quantity: str) -> MaskedArray:
-        """Return the standard error of the mean of the samples, shape (n,), in the unit of the quantity.
-
-        Raises
-        ------
-        ParameterError
-            If the quantity was not sampled.
-        """
+        """Return the standard error of the mean of a quantity's samples, (n,); ParameterError if it was not sampled."""
         check_names((quantity,), self.spreads, "quantity")
         return cast(MaskedArray, self.spreads[quantity].deviation * self._of_the_mean)
 
@@ -212,14 +198,8 @@ class MonteCarlo:
     def place(self, quantity: str, angle: Amount) -> int:
         """Return the index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
 
-        An angle outside the sampled range is reduced by whole turns, if the shift is known to repeat after them.
-
-        Raises
-        ------
-        ParameterError
-            If the quantity was not sampled.
-        InputError
-            If the quantity is not determined there.
+        An angle outside the sampled range is reduced by whole turns, if the shift is known to repeat after them. Raises
+        ParameterError if the quantity was not sampled; InputError if the quantity is not determined there.
         """
         check_names((quantity,), self.spreads, "quantity")
         away, shift = self.turn.angle - angle, self.turn.law.periodic_shift(self.turn.parameters)
@@ -249,12 +229,9 @@ class MonteCarlo:
         spread, linear = self.spreads[name], self.estimates[name]
         i = int(off[np.argmax(np.abs(linear.deviation[off] / spread.deviation[off] - 1.0))])
         second = linear.second_deviation[i]
-        vanishing = bool(np.ma.getmaskarray(linear.shares)[0, i])
-        first = (
-            "its first derivatives vanish"
-            if vanishing
-            else f"standard deviation {linear.deviation[i] / one:.3g} {unit}"
-        )
+        first = f"standard deviation {linear.deviation[i] / one:.3g} {unit}"
+        if np.ma.getmaskarray(linear.shares)[0, i]:
+            first = "its first derivatives vanish"
         to_second = "" if second is np.ma.masked else f", to second order {second / one:.3g} {unit}"
         return [
             f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_count_others(off)}: {first}, the samples' "
@@ -396,10 +373,8 @@ def _compile_problem(
     load_sought: bool, grooved: bool, names: tuple[str, ...], quantities: tuple[str, ...]
 ) -> MachineCode:
     casadi, own = library(), fields(SliderCrankParameters)
-    nominal, values, errors = (
-        casadi.SX.sym(name, size)
-        for name, size in (("nominal", len(Instant._fields)), ("values", len(own)), ("errors", len(names)))
-    )
+    sizes = {"nominal": len(Instant._fields), "values": len(own), "errors": len(names)}
+    nominal, values, errors = (casadi.SX.sym(name, size) for name, size in sizes.items())
     varied = add_errors(
         symbolic_functions(MODULES, float=lambda x: x),
         load_sought,

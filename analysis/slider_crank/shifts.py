@@ -60,13 +60,7 @@ class ShiftLaw(Protocol):
 @in_si(value="m")
 @dataclass(frozen=True, slots=True)
 class ConstantShift:
-    """The law of a crank that is held at a constant shift S1 (m).
-
-    Raises
-    ------
-    InputError
-        If the shift is not finite.
-    """
+    """The law of a crank that is held at a constant, finite shift S1 (m)."""
 
     value: Amount = 0.0
 
@@ -146,12 +140,8 @@ class AngleShift:
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """Return shift and rates; see `ShiftLaw.at`."""
-        slope = np.asarray(self.slope(angle))
-        return ShiftMotion(
-            np.asarray(self.value(angle)),
-            slope * speed,
-            slope * acceleration + np.asarray(self.curvature(angle)) * speed * speed,
-        )
+        value, slope, bend = (np.asarray(f(angle)) for f in (self.value, self.slope, self.curvature))
+        return ShiftMotion(value, slope * speed, slope * acceleration + bend * speed * speed)
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> None:
         """Return None: the law need not repeat after whole turns."""
@@ -163,12 +153,8 @@ class TimeShift:
     """A shift given as a function of time with its first two derivatives, for a crank of constant speed.
 
     ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 when the
-    crank angle is 0.
-
-    Raises
-    ------
-    InputError
-        If the law is evaluated at a crank speed that is zero or varies; use an `AngleShift` instead.
+    crank angle is 0. Raises InputError if the law is evaluated at a crank speed that is zero or varies; use an `AngleShift`
+    instead.
     """
 
     value: ArrayFunction
@@ -215,10 +201,7 @@ _PIECES = 1440
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A mechanism whose shift follows a law over the crank angle.
-
-    ``speed`` is the crank speed (rad/s). It matters only if the shift is a function of time.
-    """
+    """A mechanism whose shift follows a law; the crank's ``speed`` (rad/s) matters only if the shift is over time."""
 
     parameters: SliderCrankParameters
     law: ShiftLaw
@@ -250,11 +233,8 @@ class Course:
             return self._sign_changes(low, high, 0.0 if held else 1.0)
         find = mobility.singularities if held else mobility.dead_centres
         found = find(self.parameters, repeating)
-        moved = (
-            c._replace(crank_angle=c.crank_angle + more)
-            for more in _whole_spans(low, high, repeating.span)
-            for c in found
-        )
+        spans = _whole_spans(low, high, repeating.span)
+        moved = (c._replace(crank_angle=c.crank_angle + more) for more in spans for c in found)
         return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
 
     def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
@@ -290,9 +270,8 @@ class Course:
 
     def _assembly_square(self, angle: FloatArray) -> FloatArray:
         """Return squared rod length minus squared distance of pin from guide (m2); positive if the rod reaches the guide."""
-        return np.asarray(
-            plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
-        )
+        p = self.parameters.constants()
+        return np.asarray(plant_functions().assembly_square(angle, self._shift(angle).shift, p))
 
 
 def _whole_spans(low: float, high: float, span: float) -> list[float]:

@@ -104,13 +104,7 @@ class Sensitivities:
         return f"<Sensitivities of {', '.join(self.derivatives)} to {', '.join(self.names)} at {len(self.turn)} crank angles>"
 
     def derivative(self, quantity: str, error: str) -> MaskedArray:
-        """Return the derivative of a quantity with respect to an error, shape (n,).
-
-        Raises
-        ------
-        ParameterError
-            If there is no such quantity or error in this result.
-        """
+        """Return the derivative of a quantity by an error, (n,); ParameterError if this result does not have it."""
         check_names((quantity,), self.derivatives, "quantity")
         check_names((error,), self.names, "error")
         return cast(MaskedArray, self.derivatives[quantity][self.names.index(error)])
@@ -147,10 +141,11 @@ def sensitivities(
         if (times := list(errors).count(name)) > 1:
             raise InputError(f"{name} is given {times} times: give it once")
     n, m = len(turn), len(errors)
-    found, _ = perturb(turn, np.arange(n), error_variables(errors, n)).evaluate(quantities)
+    found, _ = perturb(turn, error_variables(errors, n)).evaluate(quantities)
     values, derivatives = {}, {}
     for name in quantities:
-        x, dead = dual(found[name]), undetermined_mask(turn, name)
+        # at a dead centre quantities that depend on an unknown load are undetermined
+        x, dead = dual(found[name]), np.ma.getmaskarray(turn.slider_force) & (name not in FREE_OF_LOAD)
         values[name] = masked_array(np.broadcast_to(x.real, (n,)), dead)
         derivatives[name] = masked_array(np.broadcast_to(x.dual, (m, n)), dead)
     return Sensitivities(
@@ -233,20 +228,17 @@ def instant(turn: ForceTurn, at: Any) -> Instant:
 
 
 def nominal_values(turn: ForceTurn) -> dict[str, float]:
-    """Return the parameters by field name.
-
-    If a groove makes the axial shift S1 (`GrooveShift`), its amplitude and ratio are included.
-    """
+    """Return the parameters by field name; with a `GrooveShift`, its amplitude and ratio are included."""
     values = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     if isinstance(turn.law, GrooveShift):
         values |= {"groove_amplitude": turn.law.amplitude, "groove_ratio": turn.law.ratio}
     return values
 
 
-def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTurn:
-    """Add ``errors``, arrays or dual numbers by name, to the mechanism at the points of the turn with the indices ``at``."""
+def perturb(turn: ForceTurn, errors: Mapping[str, Any]) -> PerturbedTurn:
+    """Add ``errors``, arrays or dual numbers by name, to the mechanism at all points of the turn."""
     load_sought, grooved = turn.sought == SLIDER_FORCE, has_shaft_groove(turn.law)
-    return add_errors(plant_functions(), load_sought, grooved, nominal_values(turn), instant(turn, at), errors)
+    return add_errors(plant_functions(), load_sought, grooved, nominal_values(turn), instant(turn, slice(None)), errors)
 
 
 def add_errors(
@@ -272,19 +264,10 @@ def add_errors(
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Return errors at n points by name, as independent dual variables.
-
-    The error with the index ``moved`` has the value ``step``, all others are zero.
-    """
+    """Return errors at n points by name, as independent dual variables: ``step`` for the one ``moved``, else zero."""
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))
-
-
-def undetermined_mask(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the dead centres at which a quantity of the nominal mechanism is undetermined."""
-    dead = np.ma.getmaskarray(turn.slider_force)
-    return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
 
 
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
@@ -490,13 +473,12 @@ def _curvatures(
     reached = np.ones(n, dtype=bool)
     for i, deviation in enumerate(deviations.tolist()):
         for sign in (1.0, -1.0):
-            moved = perturb(turn, np.arange(n), error_variables(names, n, i, sign * deviation))
+            moved = perturb(turn, error_variables(names, n, i, sign * deviation))
             found, _ = moved.evaluate(quantities)
             reached &= np.asarray(dual(moved.assembly_square).real > 0.0)
             for name in quantities:
-                curvatures[name][i] += (
-                    0.5 * sign * np.broadcast_to(dual(found[name]).dual, (m, n)) * deviations[:, None]
-                )
+                slopes = np.broadcast_to(dual(found[name]).dual, (m, n))
+                curvatures[name][i] += 0.5 * sign * slopes * deviations[:, None]
     return curvatures, reached
 
 
@@ -505,7 +487,7 @@ def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> 
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
-    lever = dual(perturb(turn, np.arange(n), error_variables(names, n)).evaluate(("slider.load",))[1])
+    lever = dual(perturb(turn, error_variables(names, n)).evaluate(("slider.load",))[1])
     change = (np.abs(np.broadcast_to(lever.dual, (len(names), n))) * extents[:, None]).sum(axis=0)
     return np.asarray(np.abs(np.broadcast_to(lever.real, (n,))) <= change)
 

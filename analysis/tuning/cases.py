@@ -92,13 +92,7 @@ class TuningCase:
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
-    """Read a tuning case from a TOML or JSON file; see `docs/tuning.md`.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If the file cannot be read, or an entry is not usable.
-    """
+    """Read a tuning case from a TOML or JSON file, see `docs/tuning.md`; InputError or ParameterError if not usable."""
     return read_tuning_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 

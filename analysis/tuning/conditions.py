@@ -18,20 +18,8 @@ from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import (
-    Crossing,
-    Family,
-    Gradient,
-    OrbitEquations,
-    PeriodicOrbit,
-    Turn,
-    Variations,
-    determinant_derivatives,
-    extremum_gradient,
-    motion_gradient,
-    motion_scales,
-    singular_matrix,
-)
+from .. import periodic
+from ..periodic import Crossing, Family, Gradient, OrbitEquations, PeriodicOrbit, Turn, singular_matrix
 from .wishes import AMPLITUDE, Limit, Wish
 
 #: Search for the level at which an output is greatest: step relative to the range's size, and greatest number of steps.
@@ -56,7 +44,7 @@ class LostError(LinkworkError):
 class Expansion(NamedTuple):
     """Derivatives of a motion with respect to the m = n + 1 + k numbers: y at crank angle 0, the level, and the changes."""
 
-    variations: Variations  # the variational equations, which have the monodromy matrix
+    variations: periodic.Variations  # the variational equations, which have the monodromy matrix
     gaps: FloatArray  # derivatives of y(T) - y(0), shape (n, m)
     monodromies: FloatArray  # derivatives of the monodromy matrix, (n, n, m)
     ways: FloatArray  # derivatives of y at the nodes of the period's panels, (panels, nodes, n, m)
@@ -94,17 +82,9 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     return OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
 
 
-def sample_turn(orbit: PeriodicOrbit, limit: Limit) -> Turn:
-    """Return the outputs over the period, with as many samples as the limit needs."""
-    return orbit.resolved_turn(limit.parts)
-
-
 def expansion(wish: Wish, spot: Spot) -> Expansion:
-    """Compute the `Expansion` of the motion at a spot from the first and second variational equations.
-
-    The motion need not be periodic.
-    """
-    along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
+    """Compute the `Expansion` of the motion at a spot, periodic or not, from first and second variational equations."""
+    along = periodic.motion_gradient(motion(wish, spot), (wish.over, *wish.names))
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
     forcing, constants = v.forcing * unit, along.along * unit
@@ -122,7 +102,7 @@ def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
     """Return the derivatives of `crossing_margin` with respect to y, the level and the changes, shape (n + 1 + k,)."""
     matrix, by = singular_matrix(found.variations.monodromy / radius, kind, found.monodromies / radius)
-    return determinant_derivatives(matrix, by)
+    return periodic.determinant_derivatives(matrix, by)
 
 
 # Equations that pick a motion from its branch: ``value`` is the residual, ``slopes`` its derivatives with respect to y, the
@@ -135,11 +115,6 @@ class CrossPlane:
 
     normal: FloatArray
     offset: float
-
-    @classmethod
-    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> CrossPlane:
-        """Return the plane on which the level is ``level``, for motions with as many components of y as the spot."""
-        return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
         return float(self.normal[:-1] @ y + self.normal[-1] * level - self.offset)
@@ -197,10 +172,7 @@ class PickedMotion:
         return slopes[..., n:] + slopes[..., :n] @ self.slopes
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Return the derivatives of an output at a crank angle with respect to the changes, shape (k,).
-
-        ``number`` is the index of the output.
-        """
+        """Return the derivatives of output ``number`` at a crank angle with respect to the changes, shape (k,)."""
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -222,7 +194,13 @@ class TrackedMotion:
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.wish, self.row = wish, row
         self._last = spot
-        self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
+        self._scale = np.append(periodic.motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
+
+    @classmethod
+    def at_level(cls, wish: Wish, spot: Spot, level: float) -> TrackedMotion:
+        """Return the motion at a level on the branch of a spot."""
+        normal = np.append(np.zeros(len(spot.y)), 1.0 / wish.size)
+        return cls(wish, CrossPlane(normal, level / wish.size), spot)
 
     def find(self, x: FloatArray) -> PickedMotion:
         """Find the motion for changes x in units of the tolerances; raise LostError if the motion is not found again."""
@@ -421,8 +399,8 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
 
     Raises LinkworkError if there is no resonance near the motion.
     """
-    orbit = TrackedMotion(wish, CrossPlane.level_plane(wish, near, near.level), near).find(x).orbit
-    found = extremum_gradient(orbit, wish.over, wish.names, near.coordinate)
+    orbit = TrackedMotion.at_level(wish, near, near.level).find(x).orbit
+    found = periodic.extremum_gradient(orbit, wish.over, wish.names, near.coordinate)
     return found.place, known_spot(wish, x, found.orbit, near.coordinate)
 
 
@@ -444,7 +422,7 @@ class OutputBelow(Condition):
         # the error of the top of a parabola is proportional to the square of its width
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
-        turn = sample_turn(found.orbit, self.limit)
+        turn = found.orbit.resolved_turn(self.limit.parts)
         self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
@@ -469,8 +447,8 @@ class OutputBelow(Condition):
         return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[PickedMotion, float]:
-        found = TrackedMotion(self._wish, CrossPlane.level_plane(self._wish, self._last, level), self._last).find(x)
-        turn = sample_turn(found.orbit, self.limit)
+        found = TrackedMotion.at_level(self._wish, self._last, level).find(x)
+        turn = found.orbit.resolved_turn(self.limit.parts)
         return found, value_at_angles(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
 from math import isfinite
@@ -17,7 +18,6 @@ from ..periodic import Crossing, SpecialPoint, describe_end
 from ..run import require_kind, show_progress
 from .conditions import (
     Condition,
-    CrossPlane,
     FloatArray,
     LostError,
     MultipliersInside,
@@ -199,11 +199,8 @@ class _Search:
         """Follow the response with changes x of the parameters and survey the range."""
         own = []
         for spot in self.more:
-            place = TrackedMotion(self.wish, CrossPlane.level_plane(self.wish, spot, spot.level), spot)
-            try:
-                own.append(place.find(x).orbit)
-            except LostError:
-                continue  # its branch is gone there
+            with suppress(LostError):  # its branch may be gone there
+                own.append(TrackedMotion.at_level(self.wish, spot, spot.level).find(x).orbit)
         return survey(self.wish, x, own)
 
     def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
@@ -473,10 +470,7 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """Yield the conditions that follow from the regions, minima, resonances and outputs of a survey.
-
-    A move for each new region is added to ``ways``.
-    """
+    """Yield the conditions that follow from a survey; a move for each new region is added to ``ways``."""
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []
@@ -496,7 +490,7 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
             yield MultipliersInside(group, TrackedMotion(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:
         if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
-            place = TrackedMotion(wish, CrossPlane.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
+            place = TrackedMotion.at_level(wish, lost.spot, lost.spot.level)
             yield MultipliersInside(STABLE, place, lost.kind, wish.radius)
     low, high = wish.range_with_margin
     for spot in found.peaks:

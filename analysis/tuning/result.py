@@ -138,10 +138,8 @@ def _interval_reading(wish: Wish, intervals: Sequence[tuple[float, float, str]],
 def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tuple[Requirement, ...]:
     """Return each requirement with its state before and after the change."""
     first, last = readings(before), readings(after, several)
-    return tuple(
-        Requirement(name=name, wished=text, before=first[name], after=last[name])
-        for name, text in describe_wish(before.wish).items()
-    )
+    wishes = describe_wish(before.wish).items()
+    return tuple(Requirement(name=name, wished=text, before=first[name], after=last[name]) for name, text in wishes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

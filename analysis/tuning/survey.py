@@ -16,37 +16,11 @@ from scipy.optimize import minimize_scalar
 
 from linkwork.errors import LinkworkError
 
+from .. import periodic
 from ..numerics.continuation import ContinuationError
-from ..periodic import (
-    GREATEST,
-    Branch,
-    Crossing,
-    Drive,
-    Orbits,
-    PeriodicOrbit,
-    Response,
-    SpecialPoint,
-    find_beginning,
-    follow_both,
-    frequency_response,
-    has_motion,
-    largest_multipliers,
-    motion_scales,
-    search_orbits,
-    speed_names,
-)
-from .conditions import (
-    CrossPlane,
-    FloatArray,
-    LostError,
-    Spot,
-    TrackedMotion,
-    crossing_margin,
-    known_spot,
-    limited_value,
-    motion,
-    sample_turn,
-)
+from ..periodic import Branch, Crossing, PeriodicOrbit, Response, SpecialPoint, speed_names
+from . import conditions
+from .conditions import CrossPlane, FloatArray, Spot, TrackedMotion, crossing_margin, known_spot
 from .wishes import Limit, Wish
 
 #: Greatest step along the response, relative to the range that is followed, and how far the response is followed beyond each
@@ -144,15 +118,9 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     low, high = _ends(wish, BESIDE)
     if wish.no_resonance:
         low, high = min(low, wish.range_with_margin[0]), max(high, wish.range_with_margin[1])
-    response = frequency_response(
-        parameters,
-        low,
-        high,
-        drive=drive,
-        vary=wish.over,
-        start=wish.start,
-        doublings=wish.turns.bit_length() - 1,
-        greatest_step=STEP,
+    doublings = wish.turns.bit_length() - 1
+    response = periodic.frequency_response(
+        parameters, low, high, drive=drive, vary=wish.over, start=wish.start, doublings=doublings, greatest_step=STEP
     )
     for orbit in more:
         response = _add_branch(wish, response, orbit)
@@ -169,7 +137,7 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
         least = tuple(found for found in without if found.value < 0.0)
     # include the motions at the minima of the test functions, which lie between the points of the branches
-    brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
+    brought = [(found.spot.level, conditions.motion(wish, found.spot)) for found in least]
     largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)
     return Survey(
         wish=wish,
@@ -198,11 +166,10 @@ def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
     """Yield the least and the greatest level of each stable stretch between neighbouring points of a branch."""
     stable = [orbit.largest <= 1.0 + MARGINAL for orbit in branch.orbits]
     lost = {special.after: special.parameter for special in branch.special}
-    for i in range(len(branch) - 1):
-        ends = [float(branch.parameter[i]), float(branch.parameter[i + 1])]
-        if not all(stable[i : i + 2]) and any(stable[i : i + 2]) and i in lost:
-            ends[stable[i]] = float(lost[i])
-        elif not all(stable[i : i + 2]):
+    for i, ends in enumerate(map(list, pairwise(branch.parameter.tolist()))):
+        if stable[i] != stable[i + 1] and i in lost:
+            ends[stable[i]] = lost[i]
+        elif not (stable[i] and stable[i + 1]):
             continue
         yield min(ends), max(ends)
 
@@ -216,9 +183,8 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
     """Return the range widened at both ends by ``beside`` times its width, without crossing zero."""
     low, high = wish.span
     wide = beside * (high - low)
-    return max(low - wide, 0.5 * low) if low > 0.0 else low - wide, min(
-        high + wide, 0.5 * high
-    ) if high < 0.0 else high + wide
+    first = max(low - wide, 0.5 * low) if low > 0.0 else low - wide
+    return first, (min(high + wide, 0.5 * high) if high < 0.0 else high + wide)
 
 
 def reaches(wish: Wish, low: float, high: float, span: tuple[float, float] | None = None) -> bool:
@@ -234,7 +200,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
         return response
     level, (low, high) = wish.level(orbit), _ends(wish, FAR)
     try:
-        branch = follow_both(
+        branch = periodic.follow_both(
             response.family.with_ratios(orbit.drive.ratios), orbit, level, low=low, high=high, greatest=STEP
         )
     except ContinuationError:
@@ -244,7 +210,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
     """Return whether a motion is on a branch of the response."""
-    return has_motion(response.branches, orbit, wish.level(orbit), response.high - response.low)
+    return periodic.has_motion(response.branches, orbit, wish.level(orbit), response.high - response.low)
 
 
 # Lost stability
@@ -279,7 +245,7 @@ def _parts(
         # such a branch begins, and may end, where a motion of half the period has the multiplier -1
         width = response.high - response.low
         points[0], points[-1] = (
-            find_beginning(
+            periodic.find_beginning(
                 response.branches, Crossing.PERIOD_DOUBLING, branch.orbits[i], wish.level(branch.orbits[i]), width
             )
             for i in (0, -1)
@@ -317,7 +283,7 @@ def _find_minimum(
     """
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
     spot = known_spot(wish, x, orbit)
-    scale = np.append(motion_scales(orbit.parameters, orbit.drive, orbit.start), wish.size)
+    scale = np.append(periodic.motion_scales(orbit.parameters, orbit.drive, orbit.start), wish.size)
     ends = [np.append(branch.orbits[j].start, branch.parameter[j]) / scale for j in (before, after)]
     normal = np.append(np.zeros(len(orbit.start)), 1.0)
     if not at_level:
@@ -327,11 +293,8 @@ def _find_minimum(
         low, high = max(low, wish.span[0] / wish.size), min(high, wish.span[1] / wish.size)
     normal = normal / scale
 
-    def across(offset: float) -> CrossPlane:
-        return CrossPlane(normal, offset)
-
     def test(offset: float) -> float:
-        place = TrackedMotion(wish, across(offset), spot)
+        place = TrackedMotion(wish, CrossPlane(normal, offset), spot)
         return crossing_margin(place.find(x).orbit.monodromy, kind, radius)
 
     offset = float(normal @ np.append(spot.y, spot.level))
@@ -343,7 +306,7 @@ def _find_minimum(
             value, offset = min([*offsets, *([(value, offset)] if low <= offset <= high else [])])
         except LinkworkError:
             pass  # next to the limit of assembly a neighbour may not be found: keep the point itself
-    row = across(offset)
+    row = CrossPlane(normal, offset)
     return TrackedMotion(wish, row, spot).find(x).spot, row, value
 
 
@@ -386,7 +349,7 @@ def _output_maxima(
     """Yield the local maxima of an output over the levels of the range, refined between the levels of the given motions."""
     found = []
     for branch in motions:
-        values = [limited_value(sample_turn(orbit, limit), limit)[0] for _, orbit in branch]
+        values = [conditions.limited_value(orbit.resolved_turn(limit.parts), limit)[0] for _, orbit in branch]
         for i, value in enumerate(values):
             if value >= max(values[max(i - 1, 0) : i + 2]):
                 found.append((value, branch[i][1]))
@@ -403,10 +366,10 @@ def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
 
     def value(level: float) -> float:
         try:
-            there = TrackedMotion(wish, CrossPlane.level_plane(wish, near, level), near).find(near.x)
-        except LostError:
+            there = TrackedMotion.at_level(wish, near, level).find(near.x)
+        except conditions.LostError:
             return 0.0  # beyond a fold
-        size, angles = limited_value(sample_turn(there.orbit, limit), limit)
+        size, angles = conditions.limited_value(there.orbit.resolved_turn(limit.parts), limit)
         found.append(OutputMaximum(limit=limit, value=size, spot=there.spot, angles=angles))
         return -size
 
@@ -429,9 +392,9 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
         start = None if wish.over in speed_names(wish.mechanism) else _nearest_motion(wish, found.response, level).start
         stable = 0
         for turns in range(1, wish.turns + 1):
-            there: Orbits = search_orbits(parameters, drive, turns=turns, start=start)
+            there: periodic.Orbits = periodic.search_orbits(parameters, drive, turns=turns, start=start)
             # a machine does not come near a motion from which deviations grow faster
-            new += [o for o in there.orbits if o.largest < GREATEST and not _meets(wish, found.response, o)]
+            new += [o for o in there.orbits if o.largest < periodic.GREATEST and not _meets(wish, found.response, o)]
             stable += len(there.stable)
         if stable > 1:
             several.append(level)
@@ -451,14 +414,10 @@ def chart_range(found: Survey) -> tuple[float, float, int]:
     """
     wish = found.wish
     levels = np.linspace(*wish.span, _CHARTED)
-    rows: list[Any] = []
-    drives: list[Drive] = []
     near = _nearest_motion(wish, found.response, wish.span[0])
-    for level in levels.tolist():
-        parameters, drive = wish.operation(found.x, level)
-        rows.append(parameters)
-        drives.append(replace(drive, ratios=near.drive.ratios))
+    rows, driven = zip(*(wish.operation(found.x, level) for level in levels.tolist()))
+    drives = [replace(drive, ratios=near.drive.ratios) for drive in driven]
     guess = None if wish.over in speed_names(wish.mechanism) and not near.rounds else near.start
-    values = np.nan_to_num(largest_multipliers(rows, drives, guess)[0], nan=np.inf)
+    values = np.nan_to_num(periodic.largest_multipliers(rows, drives, guess)[0], nan=np.inf)
     i = int(values.argmax())
     return float(values[i]), float(levels[i]), len(levels)

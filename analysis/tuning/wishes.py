@@ -14,23 +14,10 @@ from linkwork.errors import InputError, ParameterError
 from linkwork.mechanism import Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
+from .. import periodic
 from ..files import Quantity, Range, check_names, unknown_name
 from ..mechanisms import Parameters, find_mechanism
-from ..periodic import (
-    Drive,
-    NothingFreeError,
-    Operation,
-    PeriodicOrbit,
-    driving_names,
-    parameter_unit,
-    parameter_value,
-    require_variable,
-    speed_name,
-    speed_names,
-    steady_drive,
-    variable_names,
-    with_values,
-)
+from ..periodic import Drive, driving_names, parameter_unit, parameter_value, require_variable, with_values
 from ..run import published_set
 from ..units import RAD_S_PER_RPM, Amount, display_text, pair, quantity, si
 
@@ -169,7 +156,7 @@ class Wish:
         mechanism = self.mechanism
         put("over", self._check_range())
         put("between", _span(mechanism, self.over, self.between if self.speeds is None else self.speeds))
-        drive = self.drive or steady_drive(given, speed=self.span[0])
+        drive = self.drive or periodic.steady_drive(given, speed=self.span[0])
         require_variable(self.parameters, drive, self.over)
         require_free(mechanism, drive)
         alone = (
@@ -220,18 +207,14 @@ class Wish:
 
     def _check_range(self) -> str:
         """Check the arguments about the range; return the FMI name of the quantity whose range is tuned."""
-        speed = speed_name(self.mechanism, self.drive)
+        speed = periodic.speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
-            raise InputError(
-                "give the range: either speeds of the crank, or over (a drive quantity) and between (its values)"
-            )
+            raise InputError("give the range: speeds of the crank, or over (a drive quantity) and between (its values)")
         driven = self.drive is not None and not self.drive.speed_drive
         if self.between is None and (speed is None or driven):
-            why = (
-                "the drive is by torque, so that the speed follows from it"
-                if driven
-                else "its speed cannot be prescribed"
-            )
+            why = "its speed cannot be prescribed"
+            if driven:
+                why = "the drive is by torque, so that the speed follows from it"
             names = ", ".join([name for name in driving_names(self.mechanism) if name != speed][:5])
             raise InputError(
                 f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}, ..."
@@ -249,7 +232,7 @@ class Wish:
         low, high = self.between or (0.0, 0.0)
         return float(low), float(high)
 
-    def level(self, orbit: PeriodicOrbit) -> float:
+    def level(self, orbit: periodic.PeriodicOrbit) -> float:
         """Return the level of a motion: the value that the quantity ``over`` has in this motion."""
         return parameter_value(orbit.parameters, orbit.drive, self.over)
 
@@ -316,7 +299,7 @@ class Wish:
         """Convert values of the parameters to changes from the present values, in units of the tolerances."""
         return (values - self.present) / self.tolerance
 
-    def operation(self, x: FloatArray, level: float) -> Operation:
+    def operation(self, x: FloatArray, level: float) -> periodic.Operation:
         """Return mechanism and drive with changes x in units of the tolerances, at a level of the range."""
         assert self.drive is not None
         values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
@@ -327,7 +310,7 @@ def require_free(mechanism: Mechanism, drive: Drive) -> None:
     """Raise InputError if no degree of freedom is free, because the whole motion is then prescribed."""
     try:
         drive.flow(mechanism)
-    except NothingFreeError as error:
+    except periodic.NothingFreeError as error:
         free = error.force and f", or free a freedom by a force, such as {error.force} = 0"
         raise InputError(
             f"the speed prescribes the whole motion of a {mechanism.name}, so that nothing can vibrate, but tuning needs a "
@@ -338,7 +321,7 @@ def require_free(mechanism: Mechanism, drive: Drive) -> None:
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
-    name, unit = "speeds" if over in speed_names(mechanism) else over, parameter_unit(mechanism, over)
+    name, unit = "speeds" if over in periodic.speed_names(mechanism) else over, parameter_unit(mechanism, over)
     low, high = pair(given, unit, name)
     shown = [display_text(end, unit) for end in (low, high)]
     if not low < high:
@@ -350,20 +333,19 @@ def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
 
 def _find_changeable_name(mechanism: Mechanism, name: str) -> str:
     """Return the FMI name of a parameter or drive quantity, given by its FMI name or its field."""
-    known = {field_name(n): n for n in variable_names(mechanism)}
+    known = {field_name(n): n for n in periodic.variable_names(mechanism)}
     found = known.get(field_name(name))
     if found is None:
         raise unknown_name(name, known.values())
     return found
 
 
-def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
+def _changes(operation: periodic.Operation, over: str, given: Any) -> tuple[Change, ...]:
     if not isinstance(given, Mapping):
         changes = tuple(given)
     else:
-        changes = tuple(
-            _change(operation, n, value) for n, value in _flatten_names(given, find_mechanism(operation[0])).items()
-        )
+        flat = _flatten_names(given, find_mechanism(operation[0]))
+        changes = tuple(_change(operation, name, value) for name, value in flat.items())
     if not changes:
         raise InputError("nothing may be changed: name at least one parameter in change")
     for change in changes:
@@ -377,7 +359,7 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
 
 def _flatten_names(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
     """Flatten a mapping of parameters, with nested tables or dotted names, into a mapping by FMI name."""
-    parts = [name.split(".") for name in variable_names(mechanism)]
+    parts = [name.split(".") for name in periodic.variable_names(mechanism)]
     groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
     found: dict[str, Any] = {}
     for name, value in given.items():
@@ -388,7 +370,7 @@ def _flatten_names(given: Mapping[str, Any], mechanism: Mechanism, prefix: str =
     return found
 
 
-def _change(operation: Operation, name: str, value: Any) -> Change:
+def _change(operation: periodic.Operation, name: str, value: Any) -> Change:
     require_variable(*operation, name)
     unit = parameter_unit(find_mechanism(operation[0]), name)
     now, what = parameter_value(*operation, name), f"change.{name}"

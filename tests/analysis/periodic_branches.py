@@ -68,7 +68,8 @@ def branch(
         reason="",
     )
     table = {"amplitude of u [m]": a, "harmonic 1 of u [m]": 0.9 * a, "harmonic 2 of u [m]": 0.1 * a}
-    made._table.update(table | {"greatest crank torque [N.m]": 2.0 * a, "greatest force in pin A [N]": 3.0 * a})
+    table |= {"greatest crank torque [N.m]": 2.0 * a, "greatest force in pin A [N]": 3.0 * a}
+    made.__dict__["_columns"] = table
     return made
 
 

@@ -39,7 +39,7 @@ from analysis.periodic import (
 )
 from analysis.run import Inputs, TorsionBar, Trajectory, cosimulate, load_case, simulate, simulate_many
 from analysis.tuning import Limit, Wish, tune
-from analysis.tuning.conditions import limited_value, sample_turn
+from analysis.tuning.conditions import limited_value
 from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
@@ -1001,7 +1001,7 @@ def test_the_greatest_force_of_a_stop_is_found_between_the_samples() -> None:
         limits=[Limit(output="stop.exerted_force", below="2 kN")],
     )
     orbit = newton_orbit(known.parameters, Drive(speed=10.0 * math.pi))
-    value, _ = limited_value(sample_turn(orbit, wish.limits[0]), wish.limits[0])
+    value, _ = limited_value(orbit.resolved_turn(wish.limits[0].parts), wish.limits[0])
     start = {"x_position": orbit.start[0], "x_velocity": orbit.start[1]}
     run = simulate(known.parameters, Inputs(speed=10.0 * math.pi), initial=start, stop_time=0.2, step=1e-5)
     assert value == pytest.approx(run["stop.exerted_force"].max(), rel=1e-4)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy
@@ -70,27 +71,10 @@ def follow_crossing(
 ) -> CrossingCurve:
     """Follow a curve of folds, period doublings or torus points in both directions, up to the edges of a box in a plane.
 
-    Parameters
-    ----------
-    at : callable
-        Function that returns mechanism and drive at a point of the plane: see `plane`.
-    orbit : PeriodicOrbit
-        An orbit on the curve, or close to it.
-    kind : Crossing
-        Kind of the points on the curve: fold, period doubling or torus point, not branch point.
-    place : (float, float)
-        Values of the two parameters for this orbit.
-    x, y : (float, float)
-        Ranges of the two parameters, which form the box.
-    most_points : int
-        Greatest number of points in each direction.
-
-    Raises
-    ------
-    InputError
-        If the kind is a branch point: there the motion is not unique, and the equations of the curve are singular.
-    ContinuationError
-        If no point of the curve is near the orbit.
+    ``orbit`` is an orbit of the ``kind`` on the curve, or close to it, at the values ``place`` of the two parameters. ``x`` and
+    ``y`` are the ranges of the parameters, which form the box; ``at`` gives mechanism and drive at a point: see `plane`. There
+    are at most ``most_points`` points in each direction. Raises InputError if the kind is a branch point: there the motion is
+    not unique, and the equations of the curve are singular; ContinuationError if no point of the curve is near the orbit.
     """
     if kind is Crossing.BRANCH_POINT:
         raise InputError("kind is a branch point, whose curve has singular equations: stability_chart traces it")
@@ -179,6 +163,7 @@ def line_branches(
     found = coexistence(operation, xs, [y], start=start)
     branches: list[Branch] = []
     lost: list[str] = []
+    how: dict[str, Any] = {"low": x[0], "high": x[1], "greatest": STEP, "most_points": BRANCH_POINTS}
     line = zip(xs.tolist(), found.starts[0], found.largest[0].filled(np.inf))
     for number, (value, starts, largest) in enumerate(line, start=1):
         parameters, drive = operation(value, y)
@@ -188,16 +173,7 @@ def line_branches(
                 continue
             try:
                 orbit = newton_orbit(parameters, drive, start=motion, settle=False)
-                branch = follow_both(
-                    family,
-                    orbit,
-                    value,
-                    low=x[0],
-                    high=x[1],
-                    greatest=STEP,
-                    most_points=BRANCH_POINTS,
-                    stop=lambda orbit: orbit.largest > GREATEST,
-                )
+                branch = follow_both(family, orbit, value, stop=lambda orbit: orbit.largest > GREATEST, **how)
             except (OrbitError, ContinuationError) as error:
                 lost.append(f"{family.format_value(value)}: {error}")
             else:
@@ -211,19 +187,11 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
-    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
+    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane, see `plane`.
 
-    Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
-    nearest points of the grid ``near``, then from all starts of `newton_orbit`. Results are cached.
-
-    Parameters
-    ----------
-    operation : callable
-        See `plane`.
-    start : array_like, shape (n,), optional
-        Guess of the first orbit: see `find_orbit`.
-    near : Grid, optional
-        A grid over the same plane, whose orbits are further guesses.
+    Each orbit is sought from the orbit found last (first from ``start``, see `find_orbit`), so that neighbouring points stay on
+    one branch, then from the orbits at the nearest points of ``near``, a grid over the same plane, then from all starts of
+    `newton_orbit`. Results are cached.
     """
     first = None if start is None else np.array(start, dtype=float)
     last = first
@@ -288,6 +256,9 @@ def removing_damping(
 ) -> RemovingDamping:
     """Find the damping at which a region of instability vanishes: the least value of its test function over x is then zero.
 
+    The search for the least value begins from a number of ``samples`` of x; ``tolerance`` is relative to the upper end of the
+    range of damping.
+
     Parameters
     ----------
     test : callable
@@ -295,18 +266,7 @@ def removing_damping(
     x : (float, float)
         Range of the other parameter x; it contains this region and no other region.
     damping : (float, float)
-        Range of damping in which the region vanishes: the region exists at the lower end and not at the upper end.
-    samples : int
-        Number of samples of x from which the search for the least value begins.
-    tolerance : float
-        Tolerance of the damping, relative to the upper end of its range.
-
-    Raises
-    ------
-    RemovalError
-        If the region does not exist at the lower end, or still exists at the upper end.
-    LinkworkError
-        If the test function raises it.
+        Range of damping: the region exists at the lower end and not at the upper end; if not, RemovalError is raised.
     """
 
     def least(d: float) -> float:

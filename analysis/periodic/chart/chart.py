@@ -7,6 +7,7 @@ a grid of Floquet multipliers, the stability boundaries, the damping that remove
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,22 +26,7 @@ from ...numerics.boundaries import Box, chart, trace
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import show_progress, takes_published
 from ...units import Amount, display_scale, pair
-from ..motion import (
-    TOLERANCE,
-    Crossing,
-    Drive,
-    PeriodicOrbit,
-    Plane,
-    default_variable,
-    format_value,
-    parameter_unit,
-    parameter_value,
-    plane,
-    published_drive,
-    require_drive,
-    require_variable,
-    speed_names,
-)
+from ..motion import TOLERANCE, Crossing, Drive, PeriodicOrbit, Plane, published_drive, require_drive, variables
 from ..response import distance, natural_frequency, oscillating_freedoms
 from ..response.branch import motion_sizes
 from ..stability import Confirmation, SpecialPoint, confirm
@@ -106,7 +92,7 @@ class Axis:
 
     def format_value(self, value: float) -> str:
         """Return a value, given in SI, as text with the parameter's name and unit."""
-        return format_value(self.name, value, self.si)
+        return variables.format_value(self.name, value, self.si)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -287,7 +273,7 @@ def stability_chart(
     """
     mechanism = find_mechanism(parameters)
     drive = require_drive(drive)
-    names = names or (default_variable(mechanism, drive), damping_name(mechanism))
+    names = names or (variables.default_variable(mechanism, drive), damping_name(mechanism))
     for what, given in (("names", names), ("ranges", ranges)):
         if given is not None and (isinstance(given, str) or not isinstance(given, Sized) or len(given) != 2):
             raise ParameterError(what, given, "be two, along x and y")
@@ -295,11 +281,11 @@ def stability_chart(
     spans = tuple(
         default_range(parameters, drive, name)
         if ranges is None
-        else pair(ranges[n], parameter_unit(mechanism, name), name)
+        else pair(ranges[n], variables.parameter_unit(mechanism, name), name)
         for n, name in enumerate(names)
     )
     box = Box(x=spans[0], y=spans[1])
-    operation = plane(parameters, drive, *names)
+    operation = variables.plane(parameters, drive, *names)
     x, y = (np.linspace(low, high, points) for low, high in spans)
     common: dict[str, Any] = {"start": start, "n_jobs": n_jobs, "progress": progress}
     steps = _steps(coexisting)
@@ -397,22 +383,19 @@ class _Survey:
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
         """Find and trace, by a test function, the boundaries of one kind for a motion given by name and monodromy matrix."""
-        result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
+        found = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [
-            TracedBoundary(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries
+            TracedBoundary(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in found.boundaries
         ]
-        if result.gaps:
-            first = result.gaps[0]
+        if found.gaps:
+            first = found.gaps[0]
             self.problems.append(
-                f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
+                f"{motion}, {kind.value}: no value at {len(found.gaps)} points of the lines searched, the first at "
                 f"{self.place(*first.point)}: {first.message}"
             )
 
     def follow_lines(self, ys: Sequence[float], progress: bool, what: str) -> None:
-        """Follow the branches of all motions on the lines y = const; follow a boundary from each special point of a branch.
-
-        ``what`` is the text of the progress bar.
-        """
+        """Follow all branches on lines y = const, and boundaries from their special points; ``what`` is the bar's text."""
         lost: list[str] = []
         with show_progress(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys):
@@ -438,33 +421,31 @@ class _Survey:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow the boundary through a special point of a branch, unless this boundary is already known.
-
-        ``place`` has the values of the two parameters at the point.
-        """
+        """Follow the boundary through a special point at the values ``place`` of both parameters, unless it is known."""
         if self._is_known(special, place):
             return
-        what = f"the {special.kind.value} at {self.place(*place)}"
+        what, box = f"the {special.kind.value} at {self.place(*place)}", self.box
         if special.kind is Crossing.BRANCH_POINT:
             # the equations of such a curve are singular; the grid's motion goes on beyond it, and with it the test function
-            if _belongs(self.grid, special.orbit, place):
-                self._trace_multiplier(special, place, what)
+            if not _belongs(self.grid, special.orbit, place):
+                return
+            try:
+                found = trace(plane_test(self.matrix(), special.kind), place, box)
+            except LinkworkError as error:
+                self.problems.append(f"{what} is not followed: {error}")
+                return
+            traced = TracedBoundary(points=found.points, motion=TRUE_ORBIT, kind=special.kind, ends=found.ends)
+            self.traced.append(traced)
             return
         try:
             curve = follow_crossing(
-                self.operation,
-                special.orbit,
-                special.kind,
-                place,
-                x=self.box.x,
-                y=self.box.y,
-                most_points=BRANCH_POINTS,
+                self.operation, special.orbit, special.kind, place, x=box.x, y=box.y, most_points=BRANCH_POINTS
             )
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
         lost = [end for end in curve.ends if end.reason not in (Reason.BOX, Reason.CLOSED)]
-        if lost and (np.ptp(curve.points, axis=0) < STUB * np.ptp([self.box.x, self.box.y], axis=1)).all():
+        if lost and (np.ptp(curve.points, axis=0) < STUB * np.ptp([box.x, box.y], axis=1)).all():
             self.problems.append(f"{what} is not followed: {lost[0].message}")
             return
         own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
@@ -481,20 +462,6 @@ class _Survey:
             )
         )
         self.problems += [f"{what} is followed to {self.place(*end.point)} only: {end.message}" for end in lost]
-
-    def _trace_multiplier(self, special: SpecialPoint, place: tuple[float, float], what: str) -> None:
-        """Trace, by a test function, the boundary of the grid's motion through a special point.
-
-        ``what`` names the point in a message.
-        """
-        try:
-            found = trace(plane_test(self.matrix(), special.kind), place, self.box)
-        except LinkworkError as error:
-            self.problems.append(f"{what} is not followed: {error}")
-        else:
-            self.traced.append(
-                TracedBoundary(points=found.points, motion=TRUE_ORBIT, kind=special.kind, ends=found.ends)
-            )
 
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Return whether a traced boundary of the same kind and motion passes through, or close to, a special point."""
@@ -609,22 +576,15 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
     """Return the default range of the parameter ``name`` on an axis of a chart, in SI.
 
     The range of a crank speed lies around the natural frequency, if `natural_frequency` can compute it. Any other range lies
-    around the present value.
-
-    Raises
-    ------
-    InputError
-        If the present value is not above zero, or the parameter cannot vary in this drive.
+    around the present value. Raises InputError if the present value is not above zero, or the parameter cannot vary in this
+    drive.
     """
-    require_variable(parameters, drive, name)
-    if name in speed_names(find_mechanism(parameters)):
-        try:
+    variables.require_variable(parameters, drive, name)
+    if name in variables.speed_names(find_mechanism(parameters)):
+        with suppress(AssemblyError, ParameterError):
             natural = natural_frequency(parameters)
-        except (AssemblyError, ParameterError):
-            pass
-        else:
             return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
-    value = parameter_value(parameters, drive, name)
+    value = variables.parameter_value(parameters, drive, name)
     if value <= 0.0:
         raise InputError(f"{name} is {value:g} here: give the range of the axis")
     return (_OTHERS[0] * value, _OTHERS[1] * value)
@@ -633,12 +593,8 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 def damping_name(mechanism: Mechanism) -> str:
     """Return the FMI name of the damping that is an axis of a chart by default.
 
-    It is the damping of the first degree of freedom other than the crank; if this has no damping, another damping.
-
-    Raises
-    ------
-    InputError
-        If the mechanism has no damping.
+    It is the damping of the first degree of freedom other than the crank; if this has no damping, another damping. Raises
+    InputError if the mechanism has no damping.
     """
     first = [mechanism.freedoms[number].coordinate for number in oscillating_freedoms(mechanism)[:1]]
     own = [name for coordinate in first for name in mechanism.names("damping", coordinate)]
@@ -648,6 +604,6 @@ def damping_name(mechanism: Mechanism) -> str:
 
 
 def _axis(mechanism: Mechanism, name: str) -> Axis:
-    si = parameter_unit(mechanism, name)
+    si = variables.parameter_unit(mechanism, name)
     unit, factor = display_scale(si)
     return Axis(name=name, unit=unit, factor=factor, si=si)

@@ -136,10 +136,7 @@ def coexistence(
     y: ArrayLike,
     *,
     start: ArrayLike | None = None,
-    folder: str | Path | None = None,
-    n_jobs: int | None = None,
-    progress: bool = False,
-    what: str = "motions",
+    **how: Any,
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid over two parameters.
 
@@ -147,28 +144,11 @@ def coexistence(
     motions divided out. Where the sum of the indices shows that a motion is missing, the search starts from the motions of the
     neighbouring points, too. A motion that exists only in a short part of a row may still be missed; `find_orbits` searches a
     point closely. An undriven link that has a ratio in the drive goes round in all these motions; any other undriven link only
-    swings. `find_orbits` finds motions of both kinds. The rows are distributed over workers and kept as in `grid`.
+    swings. `find_orbits` finds motions of both kinds.
 
-    Parameters
-    ----------
-    operation : callable
-        See `plane`.
-    x, y : array_like, shapes (nx,) and (ny,)
-        See `grid`.
-    start : array_like, shape (n,), optional
-        A further guess. If the crank is driven by a torque, this guess is required, because it gives the crank speed; unless
-        the speed follows from a motor.
-    folder, n_jobs, progress, what
-        See `grid`.
-
-    Raises
-    ------
-    InputError
-        If an axis is empty or not finite, or ``n_jobs`` is not usable.
-    ParameterError
-        If a text on an axis is not a quantity.
-    GridInterrupted
-        On Ctrl-C.
+    ``start``, shape (n,), is a further guess of y. If the crank is driven by a torque, this guess is required, because it gives
+    the crank speed; unless the speed follows from a motor. The other arguments and the exceptions are those of `grid`, and the
+    rows are distributed over workers and kept in the same way.
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
@@ -178,11 +158,8 @@ def coexistence(
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
         kernels.solve_all,
-        folder=folder,
-        n_jobs=n_jobs,
-        progress=progress,
-        what=what,
         together=_TOGETHER,
+        **how,
     )
     whole = rows[0].flow.index_of_all
     _seek_from_neighbours(operation, xs, ys, data, whole)
@@ -210,8 +187,7 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
         return np.vstack([_compute_motions(guesses, [row]) for row in rows])
     count, n = m * len(rows), first.flow.size
     samples = SAMPLES * first.flow.turns
-    shapes = (count, MOST_ORBITS, n), (count, MOST_ORBITS, n * n), (count, MOST_ORBITS, samples)
-    starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
+    starts, monodromies, swings = (np.full((count, MOST_ORBITS, size), np.nan) for size in (n, n * n, samples))
     counts = np.zeros(count, dtype=np.int64)
     section = first.first.section(guesses[0], *_SEARCHED, switched=first.switched)
     angles = np.linspace(0.0, first.flow.period, samples, endpoint=False)
@@ -272,12 +248,8 @@ def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, wh
         except OrbitError:
             continue
         if all(orbit.distance(known) > SAME for known in into[:count, 3:]):
-            into[count] = (
-                orbit.largest,
-                orbit.amplitude,
-                index(orbit.monodromy),
-                *point.flow.nearest_to_rest(orbit.start),
-            )
+            head = orbit.largest, orbit.amplitude, index(orbit.monodromy)
+            into[count] = *head, *point.flow.nearest_to_rest(orbit.start)
             count += 1
     into[:count] = into[np.argsort(into[:count, 1], kind="stable")]
     return count > before
@@ -561,10 +533,8 @@ def _ends(
     of `_measures`.
     """
     starts = np.tile(known[0], (len(rates) * len(across), 1))
-    starts[:, place], starts[:, point.flow.size // 2 + place] = (
-        np.tile(across, len(rates)),
-        np.repeat(rates, len(across)),
-    )
+    starts[:, place] = np.tile(across, len(rates))
+    starts[:, point.flow.size // 2 + place] = np.repeat(rates, len(across))
     ends = np.zeros(len(starts), dtype=np.int64)
     near = 1.0 / float(np.linalg.norm(measures * point.scale(known[0]), ord=2, axis=(1, 2)).max())
     section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE * near)

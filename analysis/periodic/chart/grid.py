@@ -45,17 +45,11 @@ _USED = PLAIN, VARIATIONAL, IN_LANES + VARIATIONAL, IN_LANES + GAP
 def largest_multipliers(
     rows: Sequence[Parameters], drives: Sequence[Drive], guesses: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row.
+    """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row, given by parameters and drive.
 
     Newton's method starts from the orbit of the neighbouring mechanism, then from the guesses; neighbours in the sequence
-    should therefore have similar parameters.
-
-    Parameters
-    ----------
-    rows, drives : sequences of length m
-        Parameters and drive of each mechanism.
-    guesses : array_like, shape (n,) or (k, n), optional
-        Guess of y for the first mechanism, and further guesses that are used if the first leads to no orbit; see `find_orbit`.
+    should therefore have similar parameters. ``guesses``, shape (n,) or (k, n), are a guess of y for the first mechanism, and
+    further guesses that are used if the first leads to no orbit; see `find_orbit`.
 
     Returns
     -------
@@ -215,14 +209,8 @@ def grid(
         what=what,
     )
     status = data[..., -1].astype(np.int64)
-    return Grid(
-        x=xs,
-        y=ys,
-        largest=np.ma.MaskedArray(data[..., 0], mask=status != Status.DONE),
-        starts=data[..., 1:-1],
-        status=status,
-        computed=computed,
-    )
+    largest = np.ma.MaskedArray(data[..., 0], mask=status != Status.DONE)
+    return Grid(x=xs, y=ys, largest=largest, starts=data[..., 1:-1], status=status, computed=computed)
 
 
 def _compute_row(guesses: FloatArray, tolerance: float, rows: Sequence[PointRow]) -> FloatArray:
@@ -256,10 +244,8 @@ class PointRow:
 
     def points(self) -> Points:
         """Return the data of the points as arrays for the kernels."""
-        numbers, vectors = self.constants, self.vectors
-        return Points(
-            np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), self.scales
-        )
+        numbers, drives = (np.hstack([a, np.zeros_like(a)]) for a in (self.constants, self.vectors))
+        return Points(numbers, drives, self.scales)
 
     def search(self, turns: int = 1) -> Search:
         """Return the settings of the search for orbits whose period has ``turns`` common periods."""
@@ -374,10 +360,10 @@ def compute_rows(
     shape: tuple[int, ...],
     kernel: Any,
     *,
-    folder: str | Path | None,
-    n_jobs: int | None,
-    progress: bool,
-    what: str,
+    folder: str | Path | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+    what: str = "motions",
     together: int = 1,
 ) -> tuple[FloatArray, int]:
     """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
@@ -435,11 +421,7 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
 
     Each point lies at least a tenth of the range away from the edges, so that a figure shows its mark whole, unless unstable
     points lie only next to the edges. The third point has the smallest margin of stability that a long run can still measure.
-
-    Returns
-    -------
-    list of (int, int)
-        Row and column of each point; there may be fewer than three.
+    Return row and column of each point; there may be fewer than three.
     """
     margin = 1.0 - found.largest
     if margin.count() == 0:

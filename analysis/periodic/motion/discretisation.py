@@ -216,11 +216,7 @@ def _repeats(point: OperatingPoint) -> bool:
     way = np.zeros(mechanism.size)
     way[flow.crank] = flow.period
     way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
-    turned = [
-        np.eye(mechanism.size)[n] * period
-        for n, period in zip(flow.free, flow.angle_periods[: len(flow.free)])
-        if period
-    ]
+    turned = [np.eye(mechanism.size)[n] * period for n, period in zip(flow.free, flow.angle_periods) if period]
     x, found = np.array(mechanism.state(mechanism.first_set.initial)), []
     for share in (0.1234, 0.3719, 0.6283, 0.8871):
         for own in (way, *turned):

@@ -18,21 +18,11 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.mechanism import Channel, Freedom, Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
+from ... import run
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ...numerics.cache import code_folder, load_or_make
-from ...run import (
-    MOST_TURNS,
-    InductionMotor,
-    Inputs,
-    check_run,
-    complete_initial_state,
-    complete_inputs,
-    require_kind,
-    speed_ratio,
-    start_ratio,
-    takes_published,
-)
+from ...run import InductionMotor, Inputs, complete_inputs, speed_ratio, takes_published
 from ...units import Amount, in_si
 from .flow import PLAIN, Crank, Flow, find_crank, find_turning_freedom, flow
 
@@ -58,10 +48,7 @@ class VaryingInputError(InputError):
 
 
 class NothingFreeError(InputError):
-    """All degrees of freedom are commanded, so that none can oscillate.
-
-    ``force`` is an input that would free one of them; it is empty if there is none.
-    """
+    """All freedoms are commanded, so that none can oscillate; ``force`` is an input that would free one, or empty."""
 
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
@@ -132,7 +119,7 @@ class Drive:
     def __post_init__(self, speeds: Mapping[str, Any] | None) -> None:
         alone = {name: value for name in ("speed", "torque") if (value := getattr(self, name)) is not None}
         for name, value in {**alone, **self.forces, **self.held, **(speeds or {})}.items():
-            require_kind(value, Real, name, "a number in SI, or a text with its unit")
+            run.require_kind(value, Real, name, "a number in SI, or a text with its unit")
         if speeds:
             if self.speed is not None:
                 raise InputError("both speed and speeds are given: speeds has those of all commanded cranks")
@@ -140,9 +127,7 @@ class Drive:
             first = next((name for name, value in known.items() if value > 0.0), None)
             if first is None or len(known) < len(speeds):
                 mirror = _MIRROR if known and first is None and min(known.values()) < 0.0 else ""
-                raise InputError(
-                    f"speeds are {dict(speeds)} rad/s: they must be finite, and one of them above zero{mirror}"
-                )
+                raise InputError(f"speeds are {dict(speeds)} rad/s: they must be finite, and one above zero{mirror}")
             ratios = {name: speed_ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
@@ -172,10 +157,7 @@ class Drive:
     def reference(self, mechanism: Mechanism) -> Crank:
         """Return the crank to which ``speed``, ``torque`` and ``motor`` refer; its angle is the independent variable.
 
-        Raises
-        ------
-        InputError
-            If the mechanism has no crank, or has several cranks and ``crank`` names none of them.
+        Raises InputError if the mechanism has no crank, or has several cranks and ``crank`` names none of them.
         """
         return find_crank(mechanism, self.crank)
 
@@ -194,21 +176,15 @@ class Drive:
             return given
         turning, acting = {self.reference(mechanism).freedom: Fraction(1)} | given, {*self.forces, *self.motors}
         loaded = {c.freedom for c in mechanism.channels if c.kind == "force" and c.name in acting}
-        coupled = tuple(
-            n
-            for n, freedom in enumerate(mechanism.freedoms)
-            if freedom.coupled and n not in turning and (freedom.swings or n in loaded)
-        )
+        others = ((n, f) for n, f in enumerate(mechanism.freedoms) if f.coupled and n not in turning)
+        coupled = tuple(n for n, freedom in others if freedom.swings or n in loaded)
         return given | _coupled_ratios(mechanism, coupled, tuple(turning.items()))
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """Return how each degree of freedom that has a mode is driven: one of `Mode.arguments`, by the name of the mode.
 
-        Raises
-        ------
-        InputError
-            If ``modes`` names a mode that no degree of freedom other than the crank has, or gives it a value that does not
-            exist.
+        Raises InputError if ``modes`` names a mode that no degree of freedom other than the crank has, or gives it a value that
+        does not exist.
         """
         return _arguments(
             mechanism,
@@ -220,13 +196,7 @@ class Drive:
         )
 
     def flow(self, mechanism: Mechanism) -> Flow:
-        """Return the flow of the mechanism with this drive.
-
-        Raises
-        ------
-        InputError
-            If the mechanism cannot have this drive, or no degree of freedom is free.
-        """
+        """Return the flow of the mechanism with this drive; raise InputError if it cannot have it, or nothing is free."""
         crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
             what = "speed of" if self.speed_drive else "torque on"
@@ -235,9 +205,8 @@ class Drive:
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
         freedoms = mechanism.freedoms
         # ratios in whole turns; springs that couple links to the cranks fix the ratios of these links, too
-        whole = {
-            n: ratio * _whole_turns(freedoms[crank.freedom]) / _whole_turns(freedoms[n]) for n, ratio in ratios.items()
-        }
+        own = _whole_turns(freedoms[crank.freedom])
+        whole = {n: ratio * own / _whole_turns(freedoms[n]) for n, ratio in ratios.items()}
         fixed = self._with_coupled(mechanism, {n: ratio for n, ratio in ratios.items() if not freedoms[n].swings})
         common = lcm(*(of.denominator for n, of in whole.items() if n in fixed))
         base = lcm(common, *(of.denominator for of in whole.values()))
@@ -260,19 +229,8 @@ class Drive:
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
         """Return the drive for motions in which undriven links make given numbers of whole turns in ``turns`` common periods.
 
-        Parameters
-        ----------
-        mechanism : Mechanism
-        rounds : mapping of str to int
-            Number of whole turns of each link, by the FMI name of the link's coordinate.
-        turns : int
-            Number of common periods of this drive.
-
-        Returns
-        -------
-        drive : Drive
-        turns : int
-            Number of common periods of the new drive in the same time: fewer if the common period has become longer.
+        ``rounds`` is the number of whole turns of each link, by the FMI name of the link's coordinate. The second result is the
+        number of common periods of the new drive in the same time: fewer if the common period has become longer.
         """
         made, freedoms = self.flow(mechanism), {f.coordinate: f for f in mechanism.freedoms}
         ratios = {n: Fraction(times * _whole_turns(freedoms[n]), turns * made.turns) for n, times in rounds.items()}
@@ -282,12 +240,8 @@ class Drive:
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
         """Return the drive vector: channels, motor parameters, held coordinates and ratios, in the order that `Flow` describes.
 
-        Raises
-        ------
-        UnknownNameError
-            If a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the name of a torque.
-        InputError
-            If a force has no effect in this drive, or if ``held`` names a coordinate that is not held.
+        Raises UnknownNameError if a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the
+        name of a torque; InputError if a force has no effect in this drive, or if ``held`` names a coordinate that is not held.
         """
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
@@ -310,11 +264,7 @@ class Drive:
             motor = self.motor if channel == crank.torque else self.motors.get(name)
             if motor is not None:
                 require_acting(self, mechanism, mechanism.channels[channel])
-            motors += (
-                [0.0, 1.0, 1.0]
-                if motor is None
-                else [motor.breakdown_torque, motor.breakdown_slip, motor.synchronous_speed]
-            )
+            motors += [0.0, 1.0, 1.0] if motor is None else [getattr(motor, field) for field in run.MOTOR]
         if wrong := [name for name in self.motors if numbers.get(name) not in mechanism.torques]:
             raise unknown_name(wrong[0], [mechanism.channels[n].name for n in mechanism.torques])
         coordinates = [f.coordinate for f in mechanism.freedoms]
@@ -387,15 +337,14 @@ def _coupled_ratios(
         With a central difference two bodies that turn equally have opposite effects on a spring between them, under any law and
         also if the spring is twisted at the start.
         """
-        return (accelerations(number, 1.0) - accelerations(number, -1.0)) / (
-            2.0 * _whole_turns(mechanism.freedoms[number])
-        )
+        turns = 2.0 * _whole_turns(mechanism.freedoms[number])
+        return (accelerations(number, 1.0) - accelerations(number, -1.0)) / turns
 
     try:
         wound = sum((float(ratio) * winding(number) for number, ratio in turning), np.zeros(size))
         columns = np.column_stack([winding(number) for number in coupled])
         found = np.linalg.lstsq(columns, -wound, rcond=_NO_SPRING)[0].tolist()
-        fractions = [Fraction(ratio).limit_denominator(MOST_TURNS) for ratio in found]
+        fractions = [Fraction(ratio).limit_denominator(run.MOST_TURNS) for ratio in found]
     except (ArithmeticError, ValueError, np.linalg.LinAlgError):
         return {}
     return {n: ratio for n, ratio, value in zip(coupled, fractions, found) if ratio and abs(ratio - value) < _NO_SPRING}
@@ -462,14 +411,11 @@ def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return ``drive``; if it is None, return the drive of a published set.
-
-    In the drive of the set, held degrees of freedom are at the set's initial values.
-    """
+    """Return ``drive`` or, if it is None, that of a published set, which holds freedoms at the set's initial values."""
     return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
 
 
-@takes_published(inputs=complete_inputs, initial=complete_initial_state)
+@takes_published(inputs=complete_inputs, initial=run.complete_initial_state)
 @in_si(speed="rad/s", torque="N.m")
 def steady_drive(
     parameters: Parameters,
@@ -481,25 +427,13 @@ def steady_drive(
 ) -> Drive:
     """Return the drive of a periodic motion from the inputs of a run; the inputs must not vary in time.
 
-    Parameters
-    ----------
-    parameters : parameters of a mechanism
-    inputs : Inputs, optional
-    initial : state at the start, optional
-        State that gives the positions of held degrees of freedom: all those that are neither free nor the crank.
-    speed, torque : optional
-        Crank speed (rad/s) and torque on the crank (N.m), instead of the drive of the crank in ``inputs``; other commanded
-        cranks keep their ratios to the crank.
-
-    Raises
-    ------
-    VaryingInputError
-        If an input varies.
-    InputError
-        If nothing drives the crank, or if a degree of freedom that is not a crank is commanded at a speed other than zero.
+    The state at the start, ``initial``, gives the positions of held degrees of freedom: all those that are neither free nor the
+    crank. ``speed`` (rad/s) and ``torque`` (N.m) replace the drive of the crank in ``inputs``; other commanded cranks keep
+    their ratios to the crank. Raises VaryingInputError if an input varies; InputError if nothing drives the crank, or if a
+    degree of freedom that is not a crank is commanded at a speed other than zero.
     """
     mechanism = find_mechanism(parameters)
-    inputs, initial = check_run(mechanism, inputs, initial)
+    inputs, initial = run.check_run(mechanism, inputs, initial)
     modes = inputs.modes(mechanism)
     crank, ratios = _choose_crank(mechanism, inputs, initial, modes)
     constant: dict[str, float] = {}
@@ -533,10 +467,8 @@ def steady_drive(
     angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))
     coordinate = {n: f.coordinate for n, f in enumerate(mechanism.freedoms)}
     several = len(mechanism.cyclic_freedoms) > 1
-    torques = [
-        *(constant[name] for name in named[1:] if name in constant),
-        *(float(part) for part in parts if not isinstance(part, InductionMotor)),
-    ]
+    torques = [constant[name] for name in named[1:] if name in constant]
+    torques += [float(part) for part in parts if not isinstance(part, InductionMotor)]
     return Drive(
         speed=constant.get(named[0] or "") if speed is None else speed,
         torque=sum(torques) if torques else None,
@@ -559,26 +491,25 @@ def _choose_crank(
     degree of freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, see `start_ratio`,
     unless it begins at rest and a spring couples it, see `Drive.ratios_by_freedom`.
     """
-    if len(mechanism.cyclic_freedoms) < 2:
+    cranks, freedoms = mechanism.cyclic_freedoms, mechanism.freedoms
+    if len(cranks) < 2:
         return find_crank(mechanism), {}
     commanded = {mechanism.channels[n].freedom: mechanism.channels[n] for n in mechanism.commands(modes)}
-    speeds = {
-        n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic_freedoms if n in commanded
-    }
-    first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic_freedoms[0])
-    crank = find_crank(mechanism, mechanism.freedoms[first].coordinate)
-    start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic_freedoms}
+    speeds = {n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in cranks if n in commanded}
+    first = next((n for n, speed in speeds.items() if speed > 0.0), cranks[0])
+    crank = find_crank(mechanism, freedoms[first].coordinate)
+    start = {n: float(getattr(initial, freedoms[n].initial[1])) for n in cranks}
     speed = speeds.get(first) or start[first]
     ratios = {}
-    for n in mechanism.cyclic_freedoms:
+    for n in cranks:
         if n == first:
             continue
         if n in speeds and first in speeds:
             ratios[n] = speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
         elif n in speeds:
             ratios[n] = Fraction(0)
-        elif speed != 0.0 and (start[n] != 0.0 or not mechanism.freedoms[n].coupled):
-            ratios[n] = start_ratio(start[n], speed)
+        elif speed != 0.0 and (start[n] != 0.0 or not freedoms[n].coupled):
+            ratios[n] = run.start_ratio(start[n], speed)
     return crank, ratios
 
 
@@ -720,16 +651,9 @@ def spread_starts(
     motions may be much smaller than the room that the links have. If a coordinate can move much further in one direction than
     in the other, ``count`` further starts fill the ellipse about the middle of the range of this coordinate.
 
-    Parameters
-    ----------
-    guess : ndarray, shape (n,)
-        First guess of y; under a torque the crank speeds of the starts lie around the crank speed in ``guess``.
-    count : int
-        Number of starts in an ellipse, a power of two.
-    number : int
-        Index of the set of starts, which is the seed of the sequence: each index gives other starts.
-    ranges : tuple of ndarray, optional
-        Result of `start_ranges`, for callers that take several sets.
+    Under a torque the crank speeds of the starts lie around the crank speed in the first guess of y, ``guess``, shape (n,).
+    ``count`` is a power of two. Each ``number``, the seed of the sequence, gives another set of starts. Callers that take
+    several sets give the result of `start_ranges` as ``ranges``.
     """
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2

@@ -7,6 +7,7 @@ equations with periodic coefficients are judged by the same rule.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -47,18 +48,13 @@ class Crank(NamedTuple):
 @cache
 def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
     """Return all cranks of a mechanism."""
-    return tuple(
-        Crank(n, mechanism.channel_index(n, "command"), mechanism.channel_index(n, "force"))
-        for n in mechanism.cyclic_freedoms
-    )
+    index = mechanism.channel_index
+    return tuple(Crank(n, index(n, "command"), index(n, "force")) for n in mechanism.cyclic_freedoms)
 
 
 @cache
 def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
-    """Return the index of the degree of freedom of a crank, or of a link that swings and may go round.
-
-    ``name`` is one of the FMI names of the crank or link.
-    """
+    """Return the index of the degree of freedom of a crank, or of a link that may go round, by one of its FMI names."""
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
     return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
@@ -67,17 +63,8 @@ def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
 def find_crank(mechanism: Mechanism, name: str = "") -> Crank:
     """Return the crank of a mechanism, by name if there are several.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    name : str
-        FMI name of the coordinate of the crank, of its commanded speed or of the torque on it; may be left out where there is
-        one crank.
-
-    Raises
-    ------
-    InputError
-        If the mechanism has no crank, if it has several and no name is given, or if no crank has that name.
+    ``name`` is the FMI name of the coordinate of the crank, of its commanded speed or of the torque on it. Raises InputError if
+    the mechanism has no crank, if it has several and no name is given, or if no crank has that name.
     """
     cranks = find_cranks(mechanism)
     if not cranks:
@@ -107,68 +94,25 @@ class Flow:
 
     Other cranks and undriven links have a ratio to the crank whose angle is the independent variable. Commanded cranks turn
     exactly at their ratio; cranks under a torque and undriven links turn at their ratio on average. For cranks under a torque
-    and undriven links, y contains the angle minus the ratio times the crank angle: this difference is periodic. The ratio of
-    a link that only swings is 0.
+    and undriven links, y contains the angle minus the ratio times the crank angle: this difference is periodic. The ratio of a
+    link that only swings is 0.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    modes : tuple of int
-        Values of the mechanism's modes.
-    crank : int
-        Index of the cyclic degree of freedom whose angle is the independent variable.
-    base : int
-        Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
-    commons : int
-        Number of common periods of the cranks, and of the rotations that springs couple to them, in ``base`` periods of the
-        crank.
-
-    Attributes
-    ----------
-    others : tuple of int
-        Indices of the other degrees of freedom that turn, or swing and may go round.
-    free : tuple of int
-        Indices of the degrees of freedom other than the crank whose coordinates and rates are in y. A degree of freedom that is
-        commanded without a ratio is held in place.
-    torque : bool
-        Whether a torque drives the crank: the crank's rate is then in y.
-    motors : int
-        Index of the first motor parameter in the drive vector, after the channels; each of `Mechanism.torques` has three.
-    held : int
-        Index in the drive vector of the coordinates at crank angle 0, one for each degree of freedom; they are used for degrees
-        of freedom that are held or have a ratio. The ratios of ``others`` follow.
-    components : tuple of (str, str)
-        FMI name and unit of each component of y.
-    labels : tuple of str
-        Names of the components of y in messages: short symbols where there are any.
-    places : tuple of int
-        Index of each component of y in the state of a run.
-    size : int
-        Number of components of y.
-    swing_count : int
-        Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
-        crank's speed if there are none.
-    rest : ndarray, shape (n,)
-        y with the coordinates at which the mechanism starts by default, and rates of zero.
-    angle_periods : ndarray, shape (n,)
-        Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0
-        for an angle that a spring couples to others, too: a whole turn of it alone winds the spring up.
-    swinging : dict of str to int
-        Indices in y of the coordinates of undriven links that may go round, by FMI name.
+    ``modes`` are the values of the mechanism's modes; ``crank`` is the index of the cyclic degree of freedom whose angle is the
+    independent variable. After ``base`` periods of the crank all cranks, and all links that go round, have made whole turns;
+    this time is divided into ``commons`` common periods of the cranks and of the rotations that springs couple to them.
     """
 
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int, commons: int) -> None:
-        self.mechanism = mechanism
-        self.modes = modes
-        self.crank = crank
-        self.base = base
-        self.commons = commons
+        self.mechanism, self.modes, self.crank, self.base, self.commons = mechanism, modes, crank, base, commons
+        #: Indices of the other degrees of freedom that turn, or swing and may go round.
         self.others = tuple(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0 and n != crank)
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
         forced = {c.argument for c in mechanism.channels if c.kind == "force"}
         self.command = commanded.get(self.crank)
         self.commanded = {n: commanded[n] for n in self.others if n in commanded}
+        #: Indices of the degrees of freedom other than the crank whose coordinates and rates are in y. A degree of freedom that
+        #: is commanded without a ratio is held in place.
         self.free = tuple(
             n
             for n, freedom in enumerate(mechanism.freedoms)
@@ -176,8 +120,10 @@ class Flow:
             and n not in commanded
             and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
         )
+        #: Whether a torque drives the crank: the crank's rate is then in y.
         self.torque = self.command is None
         rates = len(mechanism.freedoms)
+        #: Index of each component of y in the state of a run.
         self.places = (*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque))
         variables = {v.name: v for v in mechanism.variables}
         freedoms = [mechanism.freedoms[n] for n in self.free]
@@ -188,15 +134,25 @@ class Flow:
             f"{name}'" if name == variables[f.coordinate].symbol else label(variables[f.rate])
             for f, name in zip(freedoms, labels)
         ]
+        #: Names of the components of y in messages: short symbols where there are any; FMI name and unit of each component.
         self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
         self.components = tuple((name, variables[name].unit) for name in names)
         self.size, free = len(names), len(freedoms)
+        #: Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
+        #: crank's speed if there are none.
         self.swing_count = free or self.size
         initial = mechanism.state(mechanism.initial())
+        #: y with the coordinates at which the mechanism starts by default, and rates of zero; period of each component of y,
+        #: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0 for an angle that a spring
+        #: couples to others, too: a whole turn of it alone winds the spring up.
         self.rest, self.angle_periods = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]
         self.angle_periods[:free] = [0.0 if freedom.coupled else freedom.period for freedom in freedoms]
+        #: Indices in y of the coordinates of undriven links that may go round, by FMI name.
         self.swinging = {freedom.coordinate: place for place, freedom in enumerate(freedoms) if freedom.swings}
+        #: The drive vector has the channels; from ``motors`` on three parameters of each of `Mechanism.torques`; from ``held``
+        #: on the coordinates at crank angle 0, which are used for degrees of freedom that are held or have a ratio; and the
+        #: ratios of ``others``.
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
         self.drive_size = self.held + rates + len(self.others)
@@ -205,10 +161,7 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Return the crank angle (rad) of the common period of the crank and of everything else that goes round.
-
-        It is one turn if only the crank goes round.
-        """
+        """Return the crank angle (rad) of the common period of all that goes round: one turn if only the crank does."""
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
@@ -252,17 +205,19 @@ class Flow:
 
         If ``drive`` holds m drive vectors, shape (drive, m), the entries of the state are arrays of length m.
         """
+        return tuple(self._plain_state(0.0, y.tolist(), drive.tolist() if drive.ndim == 1 else list(drive), 0.0))
+
+    def _plain_state(self, angle: Any, y: Sequence[Any], drive: Sequence[Any], zero: Any) -> list[Any]:
+        """Return the state of a run at a crank angle, except for turns by ratios, as a list of numbers or symbols."""
         rates = len(self.mechanism.freedoms)
-        numbers = drive.tolist() if drive.ndim == 1 else list(drive)
-        x = [*numbers[self.held : self.held + rates], *[0.0] * (rates + 2)]
-        x[self.crank] = 0.0
-        if self.command is not None:
-            x[rates + self.crank] = numbers[self.command]
-        for number, channel in self.commanded.items():
-            x[rates + number] = numbers[channel]
-        for place, value in zip(self.places, y.tolist()):
+        x = [*drive[self.held : self.held + rates], *[zero] * (rates + 2)]
+        x[self.crank] = angle
+        for number, channel in ({self.crank: self.command} | self.commanded).items():
+            if channel is not None:
+                x[rates + number] = drive[channel]
+        for place, value in zip(self.places, y):
             x[place] = value
-        return tuple(x)
+        return x
 
     def remove_turns(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return differences of y, shape (..., n), with whole turns of angles removed."""
@@ -277,10 +232,7 @@ class Flow:
         return self.angle_periods * np.round(away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0))
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the turns per turn of the crank of each coordinate in y that goes round, by FMI name.
-
-        These ratios are taken from the drive vector.
-        """
+        """Return the turns per turn of the crank, from the drive vector, of each coordinate in y that goes round, by name."""
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
@@ -315,14 +267,8 @@ class Flow:
         y, columns = casadi.SX.sym("y", n), casadi.SX.sym("columns", n, n + 1)
         drive, d_drive = (casadi.SX.sym(name, self.drive_size) for name in ("drive", "d_drive"))
         p, k = constants(m, switched)
-        d_p = casadi.SX.sym("d_p", p.numel())
-        arguments = [
-            angle,
-            casadi.vertcat(y, casadi.vec(columns)),
-            modes,
-            casadi.vertcat(drive, d_drive),
-            casadi.vertcat(p, d_p),
-        ]
+        d_p, join = casadi.SX.sym("d_p", p.numel()), casadi.vertcat
+        arguments = [angle, join(y, casadi.vec(columns)), modes, join(drive, d_drive), join(p, d_p)]
         x, u = self._state(angle, y, drive)
         functions = symbolic_equations(m)
         applied = functions.find(m.equations.apply_inputs)(
@@ -375,24 +321,16 @@ class Flow:
 
     def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
         """Return the state of a run and the channels as symbolic expressions of the crank angle, y and the drive vector."""
-        casadi = symbolic.library()
-        m, freedoms = self.mechanism, len(self.mechanism.freedoms)
-        held = drive[self.held : self.held + freedoms]
-        x = [*casadi.vertsplit(held), *[casadi.SX(0.0)] * freedoms, casadi.SX(0.0), casadi.SX(0.0)]
-        x[self.crank] = angle
-        for component, place in enumerate(self.places):
-            x[place] = y[component]
+        casadi, m = symbolic.library(), self.mechanism
+        x = self._plain_state(angle, casadi.vertsplit(y), casadi.vertsplit(drive), casadi.SX(0.0))
         for number, ratio in self._ratios(drive).items():
             x[number] += ratio * angle
         u = casadi.vertcat(drive[: self.inputs])
-        for number, channel in ({self.crank: self.command} | self.commanded).items():
-            if channel is not None:
-                x[freedoms + number] = u[channel]
         for n, channel in enumerate(m.torques):
             number = m.channels[channel].freedom
-            if number in (*self.free, self.crank) and (number != self.crank or self.torque):
+            if number in self.free or (number == self.crank and self.torque):
                 motor = drive[self.motors + len(MOTOR) * n : self.motors + len(MOTOR) * (n + 1)]
-                u[channel] += kloss(motor, x[freedoms + number])
+                u[channel] += kloss(motor, x[len(m.freedoms) + number])
         return tuple(x), u
 
 
@@ -436,7 +374,7 @@ class Crossing(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StabilityVerdict:
-    """A verdict on the stability of a periodic motion; it has no truth value: compare ``stability``.
+    """A verdict on the stability of a periodic motion; it has no truth value (`VerdictError`): compare ``stability``.
 
     Attributes
     ----------
@@ -447,11 +385,6 @@ class StabilityVerdict:
         Size of the margin below which the verdict is MARGINAL. A system without damping is never better than MARGINAL.
     largest_multiplier : complex
         The multiplier of the greatest modulus.
-
-    Raises
-    ------
-    VerdictError
-        If the verdict is used as a truth value.
     """
 
     stability: Stability
@@ -474,21 +407,9 @@ class StabilityVerdict:
 
 
 def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
-    """Return the Floquet multipliers, the largest modulus first.
+    """Return the Floquet multipliers, the largest modulus first: complex, shape (..., n).
 
-    Parameters
-    ----------
-    monodromy : array_like, shape (..., n, n)
-        One matrix or many.
-
-    Returns
-    -------
-    ndarray of complex, shape (..., n)
-
-    Raises
-    ------
-    InputError
-        If an entry is not finite.
+    ``monodromy`` is one matrix or many, shape (..., n, n). Raises InputError if an entry is not finite.
     """
     matrix = np.asarray(monodromy, dtype=float)
     if not np.isfinite(matrix).all():
@@ -499,18 +420,10 @@ def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
 
 
 def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVerdict:
-    """Judge the stability of a periodic motion by its multipliers.
+    """Judge the stability of a periodic motion by its multipliers, shape (n,).
 
-    Parameters
-    ----------
-    multipliers : array_like of complex, shape (n,)
-    tolerance : float
-        Size of the margin up to which the verdict is "marginal"; it should not be less than the error of the multipliers.
-
-    Raises
-    ------
-    InputError
-        If there are no multipliers, one is not finite, or the tolerance is negative or not finite.
+    ``tolerance`` is the size of the margin up to which the verdict is "marginal"; it should not be less than the error of the
+    multipliers. Raises InputError if there are no multipliers, one is not finite, or the tolerance is negative or not finite.
     """
     values = np.atleast_1d(np.asarray(multipliers, dtype=complex))
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
@@ -519,12 +432,9 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
         raise InputError(f"tolerance is {tolerance}: it must be a finite number, zero or greater")
     largest = complex(values[np.argmax(np.abs(values))])
     margin = 1.0 - abs(largest)
-    if margin > tolerance:
-        stability = Stability.STABLE
-    elif margin < -tolerance:
-        stability = Stability.UNSTABLE
-    else:
-        stability = Stability.MARGINAL
+    stability = Stability.MARGINAL
+    if abs(margin) > tolerance:
+        stability = Stability.STABLE if margin > 0.0 else Stability.UNSTABLE
     return StabilityVerdict(stability=stability, margin=margin, tolerance=tolerance, largest_multiplier=largest)
 
 
@@ -540,18 +450,9 @@ def crossing(multiplier: complex) -> Crossing:
 def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
     """Return the determinant of the monodromy matrix by Liouville's formula: exp of the integral of the trace over the period.
 
-    Parameters
-    ----------
-    trace : array_like, shape (n,)
-        Trace of the Jacobian matrix at equal steps over one period, the end left out. It is integrated by the trapezoidal
-        rule, whose error comes only from harmonics of order n and more.
-    period : float
-        Period in the unit of the independent variable, rad or s.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite, or there is none.
+    ``trace``, shape (n,), is the trace of the Jacobian matrix at equal steps over one period, the end left out. It is
+    integrated by the trapezoidal rule, whose error comes only from harmonics of order n and more. ``period`` has the unit of
+    the independent variable, rad or s. Raises InputError if a value is not finite, or there is none.
     """
     values = np.asarray(trace, dtype=float)
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
@@ -560,20 +461,12 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
 
 
 def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> NDArray[np.float64]:
-    """Return a smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle.
+    """Return a smooth function of monodromy matrices (..., n, n) that is zero where a multiplier crosses the unit circle.
 
-    Parameters
-    ----------
-    monodromy : ndarray, shape (..., n, n)
-    crossing : Crossing or int
-        The crossing; the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function is
-        det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
-        negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of
-        (mu_i mu_j - 1) over all pairs of multipliers mu_i, mu_j; it is 1 if there is a single multiplier.
-
-    Returns
-    -------
-    ndarray, shape (...,)
+    Instead of a `Crossing`, the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function
+    is det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
+    negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of (mu_i mu_j - 1) over
+    all pairs of multipliers mu_i, mu_j; it is 1 if there is a single multiplier.
     """
     if crossing is Crossing.TORUS:
         mu = multipliers(monodromy)

@@ -26,20 +26,8 @@ from ...mechanisms import Parameters, find_mechanism
 from ...numerics.continuation import Evaluation
 from ...run import compute_outputs, takes_published
 from ...units import RAD_S_PER_RPM
-from . import kernels
-from .discretisation import (
-    INTEGRATOR_TOLERANCE,
-    Discretisation,
-    Ends,
-    OperatingPoint,
-    OrbitAssemblyError,
-    OrbitError,
-    Stations,
-    can_collocate,
-    growth_factors,
-    operating_point,
-    orbit_error,
-)
+from . import discretisation, kernels
+from .discretisation import Discretisation, Ends, OperatingPoint, OrbitError, Stations, operating_point, orbit_error
 from .drive import Drive, mean_rates, spread_starts, start_ranges
 from .flow import PLAIN, STATE, TOLERANCE, VARIATIONAL, Flow, StabilityVerdict, liouville, multipliers, verdict
 from .kernels import Status
@@ -47,7 +35,7 @@ from .variables import Family
 
 FloatArray = NDArray[np.float64]
 #: Largest correction relative to the scale at which a solution counts as found.
-ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
+ORBIT_TOLERANCE = 100.0 * discretisation.INTEGRATOR_TOLERANCE
 #: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction relative to the scale of y.
 #: A motion that is found is solved again with the full tolerance.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
@@ -173,12 +161,8 @@ class Turn:
     def harmonic(self, name: str, order: float) -> float:
         """Return the amplitude of a harmonic of an output; ``order`` is the number of cycles per turn of the crank.
 
-        For a coordinate that goes round, the deviation from a uniform rotation is taken.
-
-        Raises
-        ------
-        InputError
-            If the period is not a whole number of cycles of the harmonic, or there are too few samples for the harmonic.
+        For a coordinate that goes round, the deviation from a uniform rotation is taken. Raises InputError if the period is not
+        a whole number of cycles of the harmonic, or there are too few samples for the harmonic.
         """
         number = order * self.turns
         if number != int(number) or not 0 < number < len(self.angle) / 2:
@@ -330,10 +314,7 @@ class PeriodicOrbit(NotebookResult):
         return verdict(self.multipliers, tolerance)
 
     def sample(self, angles: ArrayLike) -> FloatArray:
-        """Return the state of a run and the channels at increasing crank angles (rad), shape (m, states + inputs).
-
-        Raises OrbitError if the integration fails.
-        """
+        """Return run state and channels at increasing crank angles (rad), (m, states + inputs); OrbitError on failure."""
         places = np.array(angles, dtype=float, ndmin=1)
         rows = np.empty((len(places), self.point.mechanism.size + self.flow.inputs))
         stations, starts = (np.zeros(1), self.start[None, :].copy())
@@ -396,10 +377,8 @@ class PeriodicOrbit(NotebookResult):
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""
         equations, p = self.point.mechanism.equations, self.parameters.constants()
         modes, turn = tuple(float(value) for value in self.flow.modes), self.turn(samples)
-        return min(
-            abs(equations.clearance(x, equations.apply_inputs(modes, u, p), p))
-            for x, u in zip(turn.states.tolist(), turn.inputs.tolist())
-        )
+        samples_of = zip(turn.states.tolist(), turn.inputs.tolist())
+        return min(abs(equations.clearance(x, equations.apply_inputs(modes, u, p), p)) for x, u in samples_of)
 
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Return the determinant of the monodromy matrix from the trace of the Jacobian of dy/dangle along the orbit.
@@ -511,10 +490,7 @@ def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> 
 
 
 def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return the full turns that undriven links without a ratio in the drive make in the period after a start, by FMI name.
-
-    Links that only swing are left out.
-    """
+    """Return the full turns that undriven links without a given ratio make in the period after a start, by FMI name."""
     flow, ratios = point.flow, point.drive.ratios_by_freedom(point.mechanism)
     swinging = {name: i for name, i in flow.swinging.items() if flow.free[i] not in ratios}
     if not swinging:
@@ -643,11 +619,8 @@ def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatA
     section = point.section(start, PLAIN)
     plain = flow.function(PLAIN, mechanism.is_switched_on(point.constants.tolist()))
     z = np.append(start, np.zeros(flow.size * (flow.size + 1)))
-    rates = [
-        np.asarray(plain(angle + way, z, section.modes, section.drive, section.p)).ravel()
-        for way in (0.0, flow.period * turns)
-        for angle in (0.5, 2.0)
-    ]
+    numbers, way = (section.modes, section.drive, section.p), flow.period * turns
+    rates = [np.asarray(plain(angle, z, *numbers)).ravel() for angle in (0.5, 2.0, 0.5 + way, 2.0 + way)]
     if not np.allclose(rates[:2], rates[2:], rtol=1e-6, atol=0.0):
         raise InputError(
             f"the {mechanism.name} is not in the same configuration after {turns * flow.turns} turn(s): give another number"
@@ -663,7 +636,7 @@ def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
     try:
         mechanism.check_state(x, applied, p)
     except AssemblyError as error:
-        raise OrbitAssemblyError(str(error), flow, start, np.inf, 0) from None
+        raise discretisation.OrbitAssemblyError(str(error), flow, start, np.inf, 0) from None
 
 
 def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> PeriodicOrbit:
@@ -675,14 +648,8 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
     residual, iterations = float(report[0]), int(report[1])
     if status != Status.DONE:
         raise orbit_error(status, point.flow, start, residual, iterations)
-    return make_orbit(
-        point,
-        turns=turns,
-        start=start,
-        monodromy=z[n:].reshape(n, n).T.copy(),
-        residual=residual,
-        iterations=iterations,
-    )
+    matrix = z[n:].reshape(n, n).T.copy()
+    return make_orbit(point, turns=turns, start=start, monodromy=matrix, residual=residual, iterations=iterations)
 
 
 def trial_orbit(
@@ -696,16 +663,28 @@ def trial_orbit(
     path = path or Discretisation(np.array([0.0, point.flow.period * turns]), False)
     ends = path.ends(point, start[None, :])
     shift = ends.y[0] - start
-    made = make_orbit(
+    return _orbit_of_pieces(point, turns, start[None, :], ends, shift), shift
+
+
+def _orbit_of_pieces(
+    point: OperatingPoint,
+    turns: int,
+    starts: FloatArray,
+    ends: Ends,
+    gaps: FloatArray,
+    stations: Stations | None = None,
+) -> PeriodicOrbit:
+    """Build an orbit from y at the beginnings and the ends of the pieces of a period; for ``gaps`` see `_close`."""
+    return make_orbit(
         point,
         turns=turns,
-        start=start.copy(),
-        monodromy=ends.matrices[0].copy(),
-        residual=float(np.abs(shift / point.scale(start)).max()),
+        start=starts[0].copy(),
+        monodromy=reduce(lambda product, matrix: matrix @ product, ends.matrices).copy(),
+        residual=float(np.abs(gaps / point.scale(starts[0])).max()),
         iterations=1,
+        stations=stations,
         least_clearance=ends.clearance,
     )
-    return made, shift
 
 
 def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -727,15 +706,8 @@ class OrbitEquations:
     The unknowns are the states y at the beginnings of the pieces of a period. The residual is y at the end of each piece minus
     y at the beginning of the next piece. Each evaluation also returns the `PeriodicOrbit`.
 
-    Parameters
-    ----------
-    family : Family
-    turns : int
-        Number of common periods, `Flow.period`, in a period of the motion.
-    low, high : float
-        Range of the family's parameter.
-    angles : ndarray, shape (k + 1,), optional
-        As in `Stations`; by default the period is one piece.
+    ``turns`` is the number of common periods, `Flow.period`, in a period of the motion; ``low`` and ``high`` are the range of
+    the family's parameter; for ``angles`` see `Stations`: by default the period is one piece.
     """
 
     def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:
@@ -745,7 +717,7 @@ class OrbitEquations:
         flow = drive.flow(find_mechanism(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
         self._shape = len(self.angles) - 1, flow.size
-        self._discretised = Discretisation(self.angles, can_collocate((drive, last), (mechanism, other)))
+        self._discretised = Discretisation(self.angles, discretisation.can_collocate((drive, last), (mechanism, other)))
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
@@ -766,18 +738,9 @@ class OrbitEquations:
         direction = self._direction or self.family.direction(value, self.low, self.high)
         ends = self._discretised.ends(point, starts, value, direction, self.high - self.low)
         gaps, jacobian = _close(ends, starts)
-        scale = point.scale(starts[0])
         stations = None
         if len(starts) > 1:
-            stations = Stations(self.angles, starts, float(growth_factors(ends.matrices, scale).max()))
-        orbit = make_orbit(
-            point,
-            turns=self.turns,
-            start=starts[0].copy(),
-            monodromy=reduce(lambda product, matrix: matrix @ product, ends.matrices).copy(),
-            residual=float(np.abs(gaps / scale).max()),
-            iterations=1,
-            stations=stations,
-            least_clearance=ends.clearance,
-        )
+            growth = discretisation.growth_factors(ends.matrices, point.scale(starts[0])).max()
+            stations = Stations(self.angles, starts, float(growth))
+        orbit = _orbit_of_pieces(point, self.turns, starts, ends, gaps, stations)
         return Evaluation(gaps.ravel(), jacobian, ends.slopes.ravel(), orbit)

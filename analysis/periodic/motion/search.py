@@ -93,10 +93,7 @@ class Sweep:
 
     @property
     def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-        """Half the range of the first free coordinate at each speed, shape (m,); masked where there is no steady motion.
-
-        The unit is m for a slider, rad for an angle.
-        """
+        """Half the range of the first free coordinate (m or rad) at each speed, (m,); masked without a steady motion."""
         values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
         return np.ma.masked_invalid(np.array(values))
 
@@ -109,11 +106,7 @@ class Sweep:
 @takes_published()
 @in_si(speeds="rad/s")
 def sweep(
-    parameters: Parameters,
-    speeds: Amount,
-    *,
-    drive: Drive | None = None,
-    start: ArrayLike | None = None,
+    parameters: Parameters, speeds: Amount, *, drive: Drive | None = None, start: ArrayLike | None = None
 ) -> Sweep:
     """Step through crank speeds as a machine does: each steady motion starts from the steady motion at the last speed.
 
@@ -193,10 +186,9 @@ def _follow(
     """
     before = _speed_of_drive(last.drive)
     assert before is not None
+    drive = _with_speed(last.drive, speed)
     try:
-        orbit = newton_orbit(
-            parameters, _with_speed(last.drive, speed), turns=last.turns, start=last.start, settle=False
-        )
+        orbit = newton_orbit(parameters, drive, turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -304,10 +296,7 @@ class Orbits(NotebookResult):
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return the end of an error message, which says which motions with links that go round were not sought.
-
-    The result is empty if no link can go round.
-    """
+    """Return the end of an error message: which motions with links that go round were not sought; empty if none can."""
     names = list(drive.flow(find_mechanism(parameters)).swinging)
     if not names:
         return ""
@@ -533,7 +522,7 @@ def _search_rounds(
         for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.intermediate_starts()):
             while deflated.seek(place, divide=True):
                 pass
-        agreed = many.has_same_motions(deflated)
+        agreed = len(many.orbits) == len(deflated.orbits) and all(deflated.knows(orbit.start) for orbit in many.orbits)
         if agreed and many.index == whole:
             break
         for orbit in (*deflated.orbits, *many.orbits):
@@ -622,12 +611,6 @@ class _FoundMotions:
             self.orbits.append(orbit)
         return True
 
-    def has_same_motions(self, other: _FoundMotions) -> bool:
-        """Return whether this method and another method have found the same motions."""
-        if len(self.orbits) != len(other.orbits):
-            return False
-        return all(other.knows(orbit.start) for orbit in self.orbits)
-
     def intermediate_starts(self) -> list[FloatArray]:
         """Return starts between every pair of known motions, where a third motion often lies, and around each known motion."""
         places = [
@@ -673,10 +656,8 @@ def _reached_motion(
     if arrived is None:
         return stable[0]
     scale = point.scale(guess)
-    apart = [
-        float(np.abs(point.flow.remove_turns(orbit.passages() - arrived.start) / scale).max(axis=1).min())
-        for orbit in stable
-    ]
+    away = (point.flow.remove_turns(orbit.passages() - arrived.start) / scale for orbit in stable)
+    apart = [float(np.abs(differences).max(axis=1).min()) for differences in away]
     nearest = int(np.argmin(apart))
     if first is not None and turns == 1 and point.flow.angle_periods.any() and apart[nearest] > _ARRIVED:
         return first

@@ -68,11 +68,8 @@ class AvoidedRange:
     @property
     def words(self) -> str:
         """The reason in words."""
-        return (
-            self.risk.value.replace("resonance", f"resonance of {self.coordinate}")
-            if self.coordinate
-            else self.risk.value
-        )
+        name = f"resonance of {self.coordinate}" if self.coordinate else "resonance"
+        return self.risk.value.replace("resonance", name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -406,15 +403,9 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
             if located is None:
                 continue
             place, orbit = located
-            found.append(
-                Extremum(
-                    parameter=place,
-                    amplitude=float(orbit.amplitudes[number]),
-                    stability=orbit.verdict().stability,
-                    orbit=orbit,
-                    coordinate=number,
-                )
-            )
+            size, stability = float(orbit.amplitudes[number]), orbit.verdict().stability
+            top = Extremum(parameter=place, amplitude=size, stability=stability, orbit=orbit, coordinate=number)
+            found.append(top)
     return tuple(found)
 
 
@@ -484,20 +475,9 @@ def special_gradient(
 ) -> PointGradient:
     """Compute how a special point of a branch, or an extremum of the amplitude, moves when other parameters change.
 
-    Parameters
-    ----------
-    family : Family
-        A family over a parameter with an FMI name.
-    point : SpecialPoint or Extremum
-    names : sequence of str, optional
-        FMI names of the other parameters; by default all, see `gradient_names`.
-
-    Raises
-    ------
-    InputError
-        If the parameter of the family is not an FMI name but a function.
-    LinkworkError
-        If the value of the family's parameter at the point has no derivative, for example where two folds meet.
+    ``names`` are the FMI names of the other parameters; by default all, see `gradient_names`. Raises InputError if the
+    parameter of the family is not an FMI name but a function; LinkworkError if the value of the family's parameter at the point
+    has no derivative, for example where two folds meet.
     """
     if not isinstance(family.vary, str):
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")

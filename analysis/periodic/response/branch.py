@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from dataclasses import dataclass, replace
+from functools import cached_property, partial, reduce
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,7 @@ _BEGINNINGS = {
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Branch(NotebookResult):
     """A branch of periodic motions: the orbits along a curve over a parameter, in order.
 
@@ -84,8 +84,6 @@ class Branch(NotebookResult):
     closed: bool
     reason: str
     problems: tuple[str, ...] = ()
-    # cache of `columns`
-    _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
         special = "".join(f", {s.kind.value} at {self.family.format_value(s.parameter)}" for s in self.special)
@@ -132,22 +130,22 @@ class Branch(NotebookResult):
         each free coordinate (u of a five-bar); largest multiplier and stability; and, if the mechanism has these outputs,
         mean and greatest crank torque, greatest forces in pins, guide and bearings, and least sine of the transmission angle.
         """
-        if not self._table:
-            turns = [orbit.turn() for orbit in self.orbits]
-            values = _turn_columns(self.orbits[0], turns[0])
-            unit = f" [{self.family.unit}]" if self.family.unit else ""
-            largest = self.largest_multiplier
-            signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
-            first = {
-                f"{self.family.name}{unit}": self.parameter,
-                "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
-                "largest multiplier [1]": largest,
-                "stable (1), marginal (0), unstable (-1)": signs,
-            }
-            self._table.update(
-                first | {name: np.array([value(turn) for turn in turns]) for name, value in values.items()}
-            )
-        return dict(self._table)
+        return dict(self._columns)
+
+    @cached_property
+    def _columns(self) -> dict[str, NDArray[np.float64]]:
+        turns = [orbit.turn() for orbit in self.orbits]
+        values = _turn_columns(self.orbits[0], turns[0])
+        unit = f" [{self.family.unit}]" if self.family.unit else ""
+        largest = self.largest_multiplier
+        signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
+        first = {
+            f"{self.family.name}{unit}": self.parameter,
+            "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
+            "largest multiplier [1]": largest,
+            "stable (1), marginal (0), unstable (-1)": signs,
+        }
+        return first | {name: np.array([value(turn) for turn in turns]) for name, value in values.items()}
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the branch as a CSV table with one row per point; the columns are those of `columns`."""
@@ -179,20 +177,20 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
         what = "crank torque" if len(mechanism.cyclic_freedoms) == 1 else f"torque on {freedom.partition('.')[0]}"
         for name in mechanism.names("drive", freedom):
             columns[f"mean {what} [N.m]"] = lambda turn, name=name: float(turn[name].mean())  # type: ignore[misc]
-            columns[f"greatest {what} [N.m]"] = lambda turn, name=name: float(  # type: ignore[misc]
-                np.abs(turn[name]).max()
-            )
+            columns[f"greatest {what} [N.m]"] = partial(_greatest_magnitude, parts=(name,))
     for joint, parts in mechanism.joints.items():
-        columns[f"{FORCE}{joint.replace('.', ' ')} [N]"] = lambda turn, parts=parts: float(  # type: ignore[misc]
-            reduce(np.hypot, (turn[part] for part in parts)).max()
-        )
+        columns[f"{FORCE}{joint.replace('.', ' ')} [N]"] = partial(_greatest_magnitude, parts=parts)
     for name in mechanism.names("guide force"):
-        columns["greatest guide force [N]"] = lambda turn, name=name: float(np.abs(turn[name]).max())  # type: ignore[misc]
+        columns["greatest guide force [N]"] = partial(_greatest_magnitude, parts=(name,))
     for name in mechanism.names("transmission"):
-        columns["least sine of the transmission angle [1]"] = lambda turn, name=name: float(  # type: ignore[misc]
-            np.abs(np.sin(turn[name])).min()
-        )
+        sine = "least sine of the transmission angle [1]"
+        columns[sine] = lambda turn, name=name: float(np.abs(np.sin(turn[name])).min())  # type: ignore[misc]
     return columns
+
+
+def _greatest_magnitude(turn: Turn, parts: Sequence[str]) -> float:
+    """Return the greatest magnitude, over a period, of an output or of a force with several components."""
+    return float(np.abs(reduce(np.hypot, (turn[part] for part in parts))).max())
 
 
 def follow(
@@ -259,22 +257,9 @@ def switch(
 ) -> Branch:
     """Follow the branch that begins at a period doubling, of twice the period, or at a branch point, of the same period.
 
-    Parameters
-    ----------
-    family, low, high, greatest, most_points, stop
-        See `follow`.
-    special : SpecialPoint
-    side : float
-        +1 or -1: direction in which the new branch is followed; a branch leaves a branch point in both directions.
-    largest : float
-        The branch ends when its largest multiplier passes this value.
-
-    Raises
-    ------
-    InputError
-        If the point is neither a period doubling nor a branch point.
-    ContinuationError
-        If no point on the new branch is found.
+    ``side``, +1 or -1, is the direction in which the new branch is followed; a branch leaves a branch point in both directions.
+    The branch ends when its largest multiplier passes ``largest``. For the other arguments see `follow`. Raises InputError if
+    the point is neither a period doubling nor a branch point; ContinuationError if no point on the new branch is found.
     """
     if special.kind not in _BEGINNINGS:
         raise InputError(
@@ -283,9 +268,8 @@ def switch(
         )
     orbit, (times, lengths) = special.orbit, _BEGINNINGS[special.kind]
     settings = _settings(low, high, greatest, most_points)
-    begun = replace(
-        orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
-    )
+    power = np.linalg.matrix_power(orbit.monodromy, times)
+    begun = replace(orbit, turns=times * orbit.turns, monodromy=power, stations=None)
     follower = _follower(family, begun, settings, sizes=motion_sizes(orbit, orbit.amplitudes))
     # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
@@ -323,9 +307,7 @@ def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: floa
         return up
     down = follow(family, orbit, value, low=low, high=high, direction=-1, **how)
     before = len(down) - 1
-    early = (
-        f"at {family.format_value(float(end.parameter[-1]))} {end.reason}" for end in (down, up) if not end.reached
-    )
+    early = (f"at {family.format_value(end.parameter[-1])} {end.reason}" for end in (down, up) if not end.reached)
     turned = [replace(special, after=before - 1 - special.after) for special in reversed(down.special)]
     return Branch(
         family=family,
@@ -637,9 +619,6 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
 
 
 def has_motion(branches: Iterable[Branch], orbit: PeriodicOrbit, value: float, width: float) -> bool:
-    """Return whether one of the branches passes through a motion, which may be taken to begin at any turn of its period.
-
-    For ``value`` and ``width`` see `passes`.
-    """
+    """Return whether a branch passes through a motion, which may begin at any turn of its period; see `passes`."""
     starts = orbit.passages()
     return any(passes(b, value, start, width) for b in branches if b.turns == orbit.turns for start in starts)

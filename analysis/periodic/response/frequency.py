@@ -15,6 +15,7 @@ from functools import partial
 from itertools import product
 from math import sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,12 +79,8 @@ def mean_effective_mass(parameters: Parameters) -> float:
     """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
 
     This degree of freedom is held where its spring exerts no force, or at 0 if `stiffness_name` finds no spring. For a five-bar
-    the result is the mean of m22.
-
-    Raises
-    ------
-    AssemblyError
-        If the links cannot be joined over the whole turn with this degree of freedom held.
+    the result is the mean of m22. Raises AssemblyError if the links cannot be joined over the whole turn with this degree of
+    freedom held.
     """
     mechanism = find_mechanism(parameters)
     cranks, freedom = motion.find_cranks(mechanism), first_freedom(mechanism)
@@ -143,14 +140,10 @@ def natural_frequency(parameters: Parameters) -> float:
             "have one freedom beside its cranks, with one spring along it, for the natural frequency of this spring alone: "
             "natural_modes has those of all freedoms and springs",
         )
-    others = {n: getattr(parameters, field_name(n)) for n in mechanism.names("stiffness") if n != name}
-    for other, stiffness in others.items():
-        if stiffness:
-            raise ParameterError(
-                other,
-                stiffness,
-                f"be 0 for the natural frequency of {name} alone: natural_modes has that of all springs",
-            )
+    alone = f"be 0 for the natural frequency of {name} alone: natural_modes has that of all springs"
+    for other in mechanism.names("stiffness"):
+        if other != name and (stiffness := getattr(parameters, field_name(other))):
+            raise ParameterError(other, stiffness, alone)
     spring = getattr(parameters, field_name(name))
     if spring <= 0.0:
         raise ParameterError(name, spring, "be above zero for a natural frequency")
@@ -225,10 +218,7 @@ class Response(NotebookResult):
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Return the local maxima of the amplitudes of all free coordinates, sorted by parameter.
-
-        Motions with a multiplied period are left out.
-        """
+        """Return the local maxima of all free coordinates' amplitudes by parameter, for motions of one common period."""
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
@@ -371,6 +361,11 @@ class _Search:
     problems: list[str] = field(default_factory=list)
     failures: list[motion.OrbitError | ContinuationError] = field(default_factory=list)
 
+    def _arguments(self, **more: Any) -> dict[str, Any]:
+        """Return the arguments with which all branches are followed: see `follow`."""
+        own = {"low": self.low, "high": self.high, "greatest": self.greatest, "stop": lambda _: self.stop()}
+        return own | more
+
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
         """Follow the branch from the low end of the range, and the branch from the high end if it is a different branch.
 
@@ -392,18 +387,9 @@ class _Search:
                 orbit = motion.newton_orbit(at, driven, start=guess)
                 if any(_passes(branch, value, orbit) for branch in self.branches):
                     continue
-                branch = follow(
-                    self.family.with_ratios(orbit.drive.ratios),
-                    orbit,
-                    value,
-                    low=self.low,
-                    high=self.high,
-                    direction=direction,
-                    greatest=self.greatest,
-                    most_points=most_points,
-                    watch=watch,
-                    stop=lambda _: self.stop(),
-                )
+                family = self.family.with_ratios(orbit.drive.ratios)
+                how = self._arguments(direction=direction, most_points=most_points, watch=watch)
+                branch = follow(family, orbit, value, **how)
             except (motion.OrbitError, ContinuationError) as error:
                 self.failures.append(error)
                 self.problems.append(f"at {self.family.format_value(value)}: {error}")
@@ -434,15 +420,7 @@ class _Search:
                 if is_end(special):
                     continue
                 try:
-                    branch = switch(
-                        family,
-                        special,
-                        low=self.low,
-                        high=self.high,
-                        greatest=self.greatest,
-                        largest=largest,
-                        stop=lambda _: self.stop(),
-                    )
+                    branch = switch(family, special, **self._arguments(largest=largest))
                 except motion.OrbitError as error:
                     place = self.family.format_value(special.parameter)
                     self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
@@ -450,7 +428,7 @@ class _Search:
                 except ContinuationError:
                     without.append(self.family.format_value(special.parameter))
                     continue
-                self._keep(branch, largest)
+                self._keep(branch, largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest)
                 doubled.append(branch)
                 ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
                 if self.stop():
@@ -472,16 +450,14 @@ class _Search:
                 least = min(orbit.largest for orbit in branch.orbits[special.after : special.after + 2])
                 if special.kind is not motion.Crossing.BRANCH_POINT or least > 1.0 + motion.TOLERANCE:
                     continue
-                follow_on = partial(
-                    switch, branch.family, special, low=self.low, high=self.high, side=side, greatest=self.greatest
-                )
+                follow_on = partial(switch, branch.family, special, **self._arguments(side=side))
                 try:
                     if self._count_passages(branches, special) > 1:
                         continue
                     first = follow_on(most_points=1)
                     if self._knows(first.orbits[0], float(first.parameter[0])):
                         continue
-                    found = follow_on(stop=lambda _: self.stop())
+                    found = follow_on()
                 except (motion.OrbitError, ContinuationError) as error:
                     failed.append((special, str(error)))
                     continue
@@ -520,35 +496,24 @@ class _Search:
         for orbit in motion.search_orbits(parameters, drive, turns=turns, start=start).orbits:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):
                 continue
+            how = self._arguments(stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit))
             try:
-                branch = follow_both(
-                    self.family.with_ratios(orbit.drive.ratios),
-                    orbit,
-                    value,
-                    low=self.low,
-                    high=self.high,
-                    greatest=self.greatest,
-                    stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit),
-                )
+                branch = follow_both(self.family.with_ratios(orbit.drive.ratios), orbit, value, **how)
             except ContinuationError as error:
                 place = self.family.format_value(value)
                 self.problems.append(f"the branch through a further motion at {place} is not followed: {error}")
                 continue
-            self.branches.append(branch)
-            self.problems += branch.problems
-            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
-            if not (branch.reached or strayed):
-                self.problems.append(describe_end(branch))
+            self._keep(branch, turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit)
 
     def _knows(self, orbit: motion.PeriodicOrbit, value: float) -> bool:
         """Return whether a known branch passes through a motion."""
         return has_motion(self.branches, orbit, value, self.high - self.low)
 
-    def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
+    def _keep(self, branch: Branch, strayed: bool = False) -> None:
+        """Keep a branch with its problems; ``strayed`` tells that it ends where its motions become too unstable."""
         self.branches.append(branch)
         self.problems += branch.problems
-        left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
-        if not (branch.reached or left):
+        if not (branch.reached or strayed):
             self.problems.append(describe_end(branch))
 
 

@@ -153,10 +153,7 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Return the right and left eigenvectors of the eigenvalue nearest to ``value``, and this eigenvalue.
-
-    The eigenvectors are scaled so that their product is 1.
-    """
+    """Return right and left eigenvector, with the product 1, of the eigenvalue nearest to ``value``, and this eigenvalue."""
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -167,13 +164,7 @@ def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.comple
 
 
 def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
-    """Compute the normal form at a special point of a branch.
-
-    Raises
-    ------
-    OrbitError
-        If the integration over a period, from a start next to the orbit, fails.
-    """
+    """Compute the normal form at a special point of a branch; raise OrbitError if an integration over a period fails."""
     forms = _forms(special.orbit)
     multiplier = special.kind.sign or torus_pair(special.orbit.multipliers)[0]
     if np.abs(special.orbit.multipliers - multiplier / abs(multiplier)).min() > _LOCATED:
@@ -263,10 +254,7 @@ def _is_transcritical(forms: Forms, cubic: float) -> bool:
 
 
 def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
-    """Return the derivative of the map over a period with respect to the parameter, at a fold.
-
-    The derivative is projected on the left eigenvector.
-    """
+    """Return the derivative of the map over a period by the parameter at a fold, projected on the left eigenvector."""
     _, p, _ = _eigenvectors(forms.matrix, 1.0)
     point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
@@ -301,12 +289,8 @@ class FormRun:
 def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
     """Run the mechanism near a special point, from a small deviation, on the side where the motion of the branch is unstable.
 
-    Raises
-    ------
-    InputError
-        If the point is a fold: the branch has no motion beyond a fold.
-    LinkworkError
-        If the motion of the branch is unstable on neither side, or only over a range too narrow for a run.
+    Raises InputError if the point is a fold: the branch has no motion beyond a fold; LinkworkError if the motion of the branch
+    is unstable on neither side, or only over a range too narrow for a run.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
@@ -411,32 +395,14 @@ NOTABLE = 3.0
 
 @takes_published()
 def confirm(
-    parameters: Parameters,
-    drive: Drive,
-    *,
-    turns: int | None = None,
-    start: ArrayLike | None = None,
+    parameters: Parameters, drive: Drive, *, turns: int | None = None, start: ArrayLike | None = None
 ) -> Confirmation:
     """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
 
-    Parameters
-    ----------
-    parameters : parameters of a mechanism
-    drive : Drive
-    turns : int, optional
-        Turns of the run, or common periods of gears or several cranks; at least 20. By default 1000, and up to 20000 if the
-        margin is too small to distinguish growth from decay.
-    start : array_like, shape (n,), optional
-        Guess of the orbit.
-
-    Raises
-    ------
-    OrbitError
-        If there is no periodic orbit.
-    InputError
-        If there are less than 20 turns.
-    LinkworkError
-        If the run ends within the first turn.
+    ``turns`` is the number of turns of the run, or common periods of gears or several cranks, at least 20; by default 1000, and
+    up to 20000 if the margin is too small to distinguish growth from decay. ``start`` is a guess of the orbit, shape (n,).
+    Raises OrbitError if there is no periodic orbit; InputError if there are less than 20 turns; LinkworkError if the run ends
+    within the first turn.
     """
     if turns is not None and turns < 20:
         raise InputError(f"a run of {turns} turns: there must be at least 20 turns")
@@ -446,8 +412,13 @@ def confirm(
         # enough to change the deviation by more than NOTABLE, if possible
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
     scale = orbit.scale
-    direction, measure = _leading_vectors(orbit, scale)
-    begin = orbit.start + DISTURBANCE * scale * direction
+    values, left, right = scipy.linalg.eig(orbit.monodromy * scale / scale[:, None], left=True)
+    leading = int(np.argmax(np.abs(values)))
+    direction = right[:, leading].real
+    # the product of a deviation with the left eigenvector of the largest multiplier grows by the same factor in each turn,
+    # whereas for a complex pair the distance itself oscillates
+    measure = left[:, leading].conj()
+    begin = orbit.start + DISTURBANCE * scale * (direction / np.linalg.norm(direction))
     passed, message = _passages(orbit.point, begin, turns)
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
@@ -456,7 +427,8 @@ def confirm(
     used = np.maximum(np.abs(away @ measure), TINY)[: max(2, outside[0]) if len(outside) else None]
     if len(used) < 2:
         raise LinkworkError(f"the run beside the orbit ends within a turn: {message}")
-    growth = _growth(used)
+    # by regression of the logarithms
+    growth = exp(float(np.polyfit(np.arange(len(used)), np.log(used), 1)[0]))
     factor = growth ** len(used)
     if factor > NOTABLE or size.max() > NOTABLE * LINEAR:
         outcome = Outcome.GROWS
@@ -495,23 +467,3 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
         except OrbitError as error:
             return np.array(passed), str(error)
     return np.array(passed), ""
-
-
-def _leading_vectors(
-    orbit: PeriodicOrbit, scale: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the direction of greatest growth, of unit length, and a vector that measures the growth, in units of the scale.
-
-    The vector is the left eigenvector of the largest multiplier. The product of the deviation with this vector grows by the
-    same factor in each turn, whereas for a complex pair the distance itself oscillates.
-    """
-    scaled = orbit.monodromy * scale / scale[:, None]
-    values, left, right = scipy.linalg.eig(scaled, left=True)
-    leading = int(np.argmax(np.abs(values)))
-    direction = right[:, leading].real
-    return direction / np.linalg.norm(direction), left[:, leading].conj()
-
-
-def _growth(size: NDArray[np.float64]) -> float:
-    """Return the growth factor per turn of the sizes of a deviation at successive turns, by regression of their logarithms."""
-    return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

@@ -9,7 +9,7 @@ All derivatives are exact, up to the resolution of the collocation; none is a fi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -19,17 +19,10 @@ from linkwork.errors import InputError, LinkworkError
 
 from ...files import unknown_name
 from ...mechanisms import find_mechanism
+from ..motion import variables
 from ..motion.discretisation import operating_point
 from ..motion.flow import Crossing
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
-from ..motion.variables import (
-    differentiate_constants,
-    gradient_names,
-    parameter_value,
-    require_variable,
-    stack_derivatives,
-    with_values,
-)
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
@@ -75,10 +68,7 @@ class Gradient:
     def elasticities(self) -> dict[str, float]:
         """Change of the quantity in percent for a change of each parameter by one percent; 0 for a parameter that is 0.
 
-        Raises
-        ------
-        InputError
-            If the quantity is 0.
+        Raises InputError if the quantity is 0.
         """
         if self.value == 0.0:
             raise InputError("a quantity that is 0 has no elasticities")
@@ -132,12 +122,12 @@ class MotionGradient:
         parameters, drive = orbit.parameters, orbit.drive
         self.orbit = orbit
         self.coordinate = coordinate
-        self.names = gradient_names(parameters, drive) if names is None else tuple(names)
+        self.names = variables.gradient_names(parameters, drive) if names is None else tuple(names)
         for name in self.names:
-            require_variable(parameters, drive, name)
-        self.values = np.array([parameter_value(parameters, drive, name) for name in self.names])
-        own = differentiate_constants(parameters, self.names)
-        self.along = stack_derivatives(orbit.drive, orbit.flow, self.names, own.p)
+            variables.require_variable(parameters, drive, name)
+        self.values = np.array([variables.parameter_value(parameters, drive, name) for name in self.names])
+        own = variables.differentiate_constants(parameters, self.names)
+        self.along = variables.stack_derivatives(orbit.drive, orbit.flow, self.names, own.p)
         mechanism = find_mechanism(parameters)
         place = mechanism.switch_index
         self._switched = mechanism.is_switched_on(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
@@ -147,17 +137,9 @@ class MotionGradient:
         """The variational equations of the motion."""
         return Variations(self.orbit, self._switched, self.along)
 
-    @property
-    def forcing(self) -> FloatArray:
-        """Derivatives of dy/dangle with respect to the parameters at fixed y, at the nodes of `variations`.
-
-        The shape is (k, s, n, m).
-        """
-        return self.variations.forcing
-
     @cached_property
     def _solution(self) -> tuple[FloatArray, FloatArray]:
-        return self.variations.periodic_solution(self.forcing)
+        return self.variations.periodic_solution(self.variations.forcing)
 
     def _gradient(self, value: float, by: FloatArray) -> Gradient:
         return Gradient(value=float(value), names=self.names, by=by, at=self.values)
@@ -213,13 +195,10 @@ class MotionGradient:
         v, solution, own = self.variations, self._solution[0], self.coordinate
         number = self.names.index(along)
         by_y, by_constant = v.second_derivatives(solution[..., number], self.along[:, number])
-        twice = differentiate_constants(self.orbit.parameters, self.names, along).p_along
-        forcing = (
-            by_y @ solution
-            + by_constant @ self.along
-            + v.by_constant @ stack_derivatives(self.orbit.drive, self.orbit.flow, (), twice)
-        )
-        second, rates = v.periodic_solution(forcing)[0], v.by_y @ solution + self.forcing
+        twice = variables.differentiate_constants(self.orbit.parameters, self.names, along).p_along
+        bent = variables.stack_derivatives(self.orbit.drive, self.orbit.flow, (), twice)
+        forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ bent
+        second, rates = v.periodic_solution(forcing)[0], v.by_y @ solution + v.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
             # the place of the extremum moves so that the rate there stays zero
@@ -267,10 +246,7 @@ class MotionGradient:
     def multipliers(self) -> NDArray[np.complex128]:
         """Derivatives of the Floquet multipliers, in the order of `PeriodicOrbit.multipliers`, shape (n, m).
 
-        Raises
-        ------
-        LinkworkError
-            If two multipliers coincide: then they have no derivatives.
+        Raises LinkworkError if two multipliers coincide: then they have no derivatives.
         """
         scale, matrix = self.variations.scale, self.orbit.monodromy
         values, right = np.linalg.eig((matrix * scale / scale[:, None]).astype(complex))
@@ -301,18 +277,9 @@ class MotionGradient:
 def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
     """Compute the derivatives of a periodic motion with respect to parameters.
 
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-    names : sequence of str, optional
-        FMI names of the parameters; by default all, see `gradient_names`.
-
-    Raises
-    ------
-    UnknownNameError, InputError
-        If a name is not the name of a parameter, or the parameter has no effect in this drive.
-    LinkworkError
-        If the variational equations cannot be resolved.
+    ``names`` are the FMI names of the parameters; by default all, see `gradient_names`. Raises UnknownNameError if a name is
+    not the name of a parameter; InputError if the parameter has no effect in this drive; LinkworkError if the variational
+    equations cannot be resolved.
 
     Examples
     --------
@@ -327,10 +294,7 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
 
 def extremum_orbit(orbit: PeriodicOrbit, along: str, coordinate: int = 0) -> PeriodicOrbit:
-    """Return the motion at an extremum of the amplitude over a parameter, starting from a motion near the extremum.
-
-    See `extremum_gradient`.
-    """
+    """Return the motion at an extremum of the amplitude over a parameter, from one near it: see `extremum_gradient`."""
     return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude", coordinate)
 
 
@@ -339,23 +303,10 @@ def extremum_gradient(
 ) -> PointGradient:
     """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
-    An extremum that is too near to a fold to be told from it moves with the fold.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        A motion near the extremum, from which Newton's method begins.
-    along : str
-        FMI name of the parameter, such as ``drive.speed``.
-    names : sequence of str, optional
-        FMI names of the other parameters; by default all, see `gradient_names`.
-    coordinate : int
-        Index of the free coordinate whose amplitude has the extremum.
-
-    Raises
-    ------
-    LinkworkError
-        If there is no extremum near the motion.
+    An extremum that is too near to a fold to be told from it moves with the fold. Newton's method begins from a motion near the
+    extremum of the amplitude of the free coordinate with the index ``coordinate``. ``along`` is the FMI name of the parameter,
+    such as ``drive.speed``; ``names`` are those of the other parameters, by default all, see `gradient_names`. Raises
+    LinkworkError if there is no extremum near the motion.
     """
     others = _other_names(orbit, along, names)
     try:
@@ -366,13 +317,7 @@ def extremum_gradient(
         return crossing_gradient(orbit, Crossing.FOLD, along, others, coordinate)
     slopes = motion.amplitude_curvature(along).by
     # at the extremum the amplitude does not change with the parameter ``along``
-    amplitude, at = motion.amplitude, motion.values[:-1]
-    return PointGradient(
-        along=along,
-        place=Gradient(value=float(motion.values[-1]), names=others, by=-slopes[:-1] / slopes[-1], at=at),
-        amplitude=Gradient(value=amplitude.value, names=others, by=amplitude.by[:-1], at=at),
-        orbit=motion.orbit,
-    )
+    return _point_gradient(motion, -slopes[:-1] / slopes[-1], motion.amplitude.value, motion.amplitude.by[:-1])
 
 
 def crossing_gradient(
@@ -380,56 +325,38 @@ def crossing_gradient(
 ) -> PointGradient:
     """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
-    For the arguments see `extremum_gradient`; ``kind`` is the kind of the point.
-
-    Raises
-    ------
-    LinkworkError
-        If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
-        two folds meet, or two branches cross.
+    For the arguments see `extremum_gradient`; ``kind`` is the kind of the point. Raises LinkworkError if there is no such point
+    near the motion, or its place has no derivative: the boundary is parallel to the parameter, two folds meet, or two branches
+    cross.
     """
     _require_derivative(kind)
     others = _other_names(orbit, along, names)
-    orbit = _locate_motion(
-        orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
-    )
+    step: _Step = _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind)
+    orbit = _locate_motion(orbit, along, step, kind.value)
     motion = MotionGradient(orbit, (*others, along), coordinate)
     test = _test(motion, kind)
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
         raise LinkworkError(f"the {kind.value} does not move along {along}: its place there has no derivative")
     shift = -test[:-1] / test[-1]
     amplitude = motion.gradient_for_motion(_fold_motion(motion, shift)) if kind is Crossing.FOLD else motion.amplitude
-    by = amplitude.by[:-1] + amplitude.by[-1] * shift
-    at = motion.values[:-1]
-    return PointGradient(
-        along=along,
-        place=Gradient(value=float(motion.values[-1]), names=others, by=shift, at=at),
-        amplitude=Gradient(value=amplitude.value, names=others, by=by, at=at),
-        orbit=orbit,
-    )
+    return _point_gradient(motion, shift, amplitude.value, amplitude.by[:-1] + amplitude.by[-1] * shift)
+
+
+def _point_gradient(motion: MotionGradient, place: FloatArray, amplitude: float, by: FloatArray) -> PointGradient:
+    """Build the gradient of a point that moves along the last name, from the derivatives of its place and amplitude."""
+    *others, along = motion.names
+    own = Gradient(value=float(motion.values[-1]), names=tuple(others), by=place, at=motion.values[:-1])
+    size = replace(own, value=amplitude, by=by)
+    return PointGradient(along=along, place=own, amplitude=size, orbit=motion.orbit)
 
 
 def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
     """Compute the normal of the stability boundary in the space of parameters, at one of its points.
 
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        A motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`.
-    kind : Crossing
-    names : sequence of str
-        FMI names of the parameters, such as the two axes of a chart.
-
-    Returns
-    -------
-    Gradient
-        Gradient of a function that is zero on the boundary: for a period doubling or torus point `MotionGradient.test`; for a
-        fold the shift of the map over a period along the left eigenvector.
-
-    Raises
-    ------
-    LinkworkError
-        If the kind is a branch point.
+    ``orbit`` is a motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`; ``names`` are the FMI
+    names of the parameters, such as the two axes of a chart. The result is the gradient of a function that is zero on the
+    boundary: for a period doubling or torus point `MotionGradient.test`; for a fold the shift of the map over a period along
+    the left eigenvector. Raises LinkworkError if the kind is a branch point.
     """
     _require_derivative(kind)
     motion = MotionGradient(orbit, names)
@@ -442,8 +369,8 @@ def _require_derivative(kind: Crossing) -> None:
 
 
 def _other_names(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
-    require_variable(orbit.parameters, orbit.drive, along)
-    names = gradient_names(orbit.parameters, orbit.drive) if names is None else names
+    variables.require_variable(orbit.parameters, orbit.drive, along)
+    names = variables.gradient_names(orbit.parameters, orbit.drive) if names is None else names
     return tuple(name for name in names if name != along)
 
 
@@ -459,7 +386,7 @@ def _locate_motion(
     Raises LinkworkError if Newton's method does not converge to a point near the motion; ``what`` names the point in the
     message.
     """
-    begun = parameter_value(orbit.parameters, orbit.drive, along)
+    begun = variables.parameter_value(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
         motion = MotionGradient(orbit, (along,), coordinate)
         try:
@@ -470,7 +397,7 @@ def _locate_motion(
         value = float(motion.values[0]) + step
         if not abs(value - begun) < _FAR * abs(begun):
             break
-        parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
+        parameters, drive = variables.with_values(orbit.parameters, orbit.drive, {along: value})
         start = orbit.start + change
         if newton_step is _fold_step:
             orbit, _ = trial_orbit(operating_point(parameters, drive), start, orbit.turns)
@@ -507,12 +434,8 @@ def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     # derivatives of the motion by its start and by the parameter
     columns = np.concatenate([v.fundamental, v.solve_from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
     along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
-    matrix = np.vstack(
-        [
-            np.hstack([v.monodromy - np.eye(n), v.final_deviation(v.forcing)]),
-            left @ v.final_deviation(by_y @ columns + by_constant @ along),
-        ]
-    )
+    closed = np.hstack([v.monodromy - np.eye(n), v.final_deviation(v.forcing)])
+    matrix = np.vstack([closed, left @ v.final_deviation(by_y @ columns + by_constant @ along)])
     shift = orbit.point.period(orbit.start, orbit.turns).shift
     test = left @ (v.monodromy - np.eye(n)) @ right
     step = np.linalg.solve(matrix, -np.append(shift, test))
@@ -520,13 +443,10 @@ def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
 
 
 def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
-    """Return the derivatives of a function of the m parameters that is zero where the multiplier is on the unit circle.
-
-    The shape is (m,).
-    """
+    """Return the derivatives, (m,), of a function of the parameters that is zero with a multiplier on the unit circle."""
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
-        return left @ motion.variations.final_deviation(motion.forcing)
+        return left @ motion.variations.final_deviation(motion.variations.forcing)
     return motion.test(kind).by
 
 

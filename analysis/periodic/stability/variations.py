@@ -140,7 +140,8 @@ class Variations:
         for _ in range(_HALVINGS):
             self.h = np.diff(edges)
             self.angles = edges[:-1, None] + self.h[:, None] * _GAUSS.nodes
-            self.y = self._sample_motion()
+            states = self.orbit.sample(self.angles.ravel())
+            self.y = flow.unknowns(states, self._drive).reshape(*self.angles.shape, flow.size)
             self.rates, first = self._first_derivatives()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
             self.forcing = self.by_constant @ along
@@ -171,10 +172,7 @@ class Variations:
         return joined
 
     def _find_kinks(self) -> list[_Kink]:
-        """Return the kinks of the rates.
-
-        A kink is between the first node of its panel and the first node of the next one.
-        """
+        """Return the kinks of the rates. A kink is between the first node of its panel and the first node of the next one."""
         relative = self.scale[:, None] / self.scale
         jumps = _greatest((np.roll(self.by_y[:, 0], -1, axis=0) - self.by_y[:, 0]) / relative)
         steep = jumps > _STEEP * np.sqrt(self.h) * np.abs(self.by_y / relative).max()
@@ -194,11 +192,6 @@ class Variations:
             by_y, by_constant, by_angle = map(np.subtract, after, before)
             kinks.append(_Kink(k, by_y, by_constant, by_y @ self.rates[k, 0] + by_angle))
         return kinks
-
-    def _sample_motion(self) -> FloatArray:
-        """Return the motion at the nodes, shape (k, s, n)."""
-        found = self.orbit.sample(self.angles.ravel())
-        return self.flow.unknowns(found, self._drive).reshape(*self.angles.shape, self.flow.size)
 
     def _call(
         self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None
@@ -245,12 +238,8 @@ class Variations:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of ``by_y`` and of ``by_constant`` along a direction.
 
-        Parameters
-        ----------
-        direction : ndarray, shape (k, s, n)
-            Components of the direction in the space of y, at the nodes.
-        along : ndarray, shape (c,), optional
-            Components of the direction in the space of the drive vector and the constants; zero if not given.
+        ``direction`` has the components in the space of y at the nodes, shape (k, s, n); ``along`` those in the space of the
+        drive vector and the constants, shape (c,), zero if not given.
         """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
@@ -272,12 +261,10 @@ class Variations:
         size = _POINTS * n
         integrals = self.h[:, None, None] * _GAUSS.integrals
         matrix = np.eye(size) - np.einsum("kij,kjab->kiajb", integrals, self.by_y).reshape(k, size, size)
-        inverse = np.linalg.inv(matrix)
+        inverse = np.linalg.inv(matrix).reshape(k, size, _POINTS, n)
         #: Matrices that give d at the nodes, from r and from d at the beginning of the panel.
-        self._to_nodes = np.einsum("kxia,kij->kxja", inverse.reshape(k, size, _POINTS, n), integrals).reshape(
-            k, size, size
-        )
-        self._from_start = inverse.reshape(k, size, _POINTS, n).sum(axis=2)
+        self._to_nodes = np.einsum("kxia,kij->kxja", inverse, integrals).reshape(k, size, size)
+        self._from_start = inverse.sum(axis=2)
         weights = self.h[:, None] * _GAUSS.weights
         weighted = np.einsum("ki,kiab->kaib", weights, self.by_y).reshape(k, n, size)
         #: Matrices that give d at the end of the panel, from r and from d at the beginning.
@@ -322,10 +309,7 @@ class Variations:
     def periodic_solution(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the periodic solution of d' = A d + r: at the nodes, (k, s, n, m), and at crank angle 0, (n, m).
 
-        Raises
-        ------
-        LinkworkError
-            If there is no such solution: exactly at a fold.
+        Raises LinkworkError if there is no such solution: exactly at a fold.
         """
         starts = _solve_cyclic(self.steps, self._gains(forcing))
         return self._node_values(starts, forcing), starts[0]
@@ -454,13 +438,8 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
     angle, modes = casadi.SX.sym("angle"), casadi.SX.sym("modes", len(flow.mechanism.modes))
     drive, d_drive = casadi.SX.sym("drive", flow.drive_size), casadi.SX.sym("d_drive", flow.drive_size)
     p, d_p = casadi.SX.sym("p", size), casadi.SX.sym("d_p", size)
-    arguments = (
-        angle,
-        casadi.vertcat(y, casadi.SX.zeros(n * (n + 1))),
-        modes,
-        casadi.vertcat(drive, casadi.SX.zeros(flow.drive_size)),
-        casadi.vertcat(p, casadi.SX.zeros(size)),
-    )
+    join, zeros = casadi.vertcat, casadi.SX.zeros
+    arguments = angle, join(y, zeros(n * (n + 1))), modes, join(drive, zeros(flow.drive_size)), join(p, zeros(size))
     x, u = state(*arguments)
     trace = expressions(flow.mechanism, switched)
     outputs = casadi.Function("outputs", [*trace.symbols], [trace.outputs])(x, modes, u, casadi.vertcat(p, 0.0))
@@ -487,13 +466,8 @@ def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
             results = [casadi.reshape(along, *jacobian.shape)]
         else:
             results = [s.outputs]
-        arguments = [
-            casadi.SX.sym("t"),
-            casadi.vertcat(s.y, s.dy, s.angle),
-            s.modes,
-            casadi.vertcat(s.drive, s.d_drive),
-            casadi.vertcat(s.p, s.d_p),
-        ]
+        t, join = casadi.SX.sym("t"), casadi.vertcat
+        arguments = [t, join(s.y, s.dy, s.angle), s.modes, join(s.drive, s.d_drive), join(s.p, s.d_p)]
         return MachineCode([casadi.Function(name, arguments, [casadi.densify(r) for r in results], {"cse": True})])
 
 
@@ -502,13 +476,16 @@ def _angle_derivatives(flow: Flow, switched: bool) -> Any:
     """Return the function that gives the derivatives of the rates by the angle."""
     casadi = symbolic.library()
     s = _symbols(flow, switched)
-    slopes = casadi.densify(casadi.jacobian(s.rates, s.angle))
-    return casadi.Function("slopes", [s.angle, s.y, s.modes, s.drive, s.p], [slopes], {"cse": True})
+    return _make_function(s, casadi.jacobian(s.rates, s.angle))
 
 
 @cache
 def _output_derivatives(flow: Flow, switched: bool, number: int) -> Any:
     casadi = symbolic.library()
     s = _symbols(flow, switched)
-    gradient = casadi.jacobian(s.outputs[number], casadi.vertcat(s.y, s.drive, s.p))
-    return casadi.Function("gradient", [s.angle, s.y, s.modes, s.drive, s.p], [casadi.densify(gradient)], {"cse": True})
+    return _make_function(s, casadi.jacobian(s.outputs[number], casadi.vertcat(s.y, s.drive, s.p)))
+
+
+def _make_function(s: _Symbols, result: Any) -> Any:
+    casadi = symbolic.library()
+    return casadi.Function("f", [s.angle, s.y, s.modes, s.drive, s.p], [casadi.densify(result)], {"cse": True})
