@@ -316,6 +316,8 @@ def find_equilibria(
 ) -> tuple[Equilibrium, ...]:
     """Find the equilibria of a mechanism, starting from a grid over all configurations; sort them by `Equilibrium.potential`.
 
+    Angles of cyclic degrees of freedom are in (-pi, pi]. If the equilibria are not isolated, only some of them are found.
+
     Parameters
     ----------
     parameters
@@ -325,12 +327,6 @@ def find_equilibria(
     held : mapping, optional
         Coordinates (rad, m) of held degrees of freedom, such as ``{"crank.angle": "30 deg"}``; 0 for a degree of freedom held
         by the inputs alone.
-
-    Returns
-    -------
-    tuple of Equilibrium
-        The equilibria, with angles of cyclic degrees of freedom in (-pi, pi]. If they are not isolated, only some of them are
-        found.
 
     Raises
     ------

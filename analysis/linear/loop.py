@@ -372,6 +372,8 @@ def control_loop(
 ) -> LoopResult:
     """Run a closed loop of a controller and the nonlinear plant; the plant runs in this process or as its FMU.
 
+    If the motion reaches the limit of assembly, or cannot be followed, the result ends there, with a status and a message.
+
     Parameters
     ----------
     parameters
@@ -391,11 +393,6 @@ def control_loop(
         The mechanism's FMU, which is run instead of the plant in this process.
     tolerance : float
         Tolerance of the plant's integrator.
-
-    Returns
-    -------
-    LoopResult
-        If the motion reaches the limit of assembly, or cannot be followed, the result ends there, with a status and a message.
 
     Raises
     ------

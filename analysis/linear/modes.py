@@ -63,8 +63,7 @@ class NaturalModes:
     shares: FloatArray
 
     def __repr__(self) -> str:
-        speeds = self._per_mode(self.frequencies / RAD_S_PER_RPM)
-        spans = (f"{column.min():.6g} to {column.max():.6g}" for column in speeds)
+        spans = (f"{low:.6g} to {high:.6g}" for low, _, high in self.frequency_ranges / RAD_S_PER_RPM)
         words = f"natural frequencies [rpm] {', '.join(spans)}" if self.frequencies.shape[1] else "nothing vibrates"
         unstable = f", {self.unstable} of them unstable" if self.unstable else ""
         return (
@@ -93,11 +92,9 @@ class NaturalModes:
         return int(np.sum(model.vibration_grows(self.poles)))
 
     @staticmethod
-    def _per_mode(values: FloatArray) -> list[FloatArray]:
-        return [column[np.isfinite(column)] for column in values.T]
-
-    def _ranges(self, values: FloatArray) -> FloatArray:
-        return np.array([[v.min(), v.mean(), v.max()] for v in self._per_mode(values)]).reshape(-1, 3)
+    def _ranges(values: FloatArray) -> FloatArray:
+        per_mode = (column[np.isfinite(column)] for column in values.T)
+        return np.array([[v.min(), v.mean(), v.max()] for v in per_mode]).reshape(-1, 3)
 
 
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)

@@ -253,7 +253,9 @@ class ForceTurn:
         return np.asarray((distances > away).all(axis=1))
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
-        """Return the components of a force or moment, masked where it is undetermined.
+        """Return the components of a force or moment (N or N.m), shape (n, 3), masked where it is undetermined.
+
+        Raises InputError if there is no such vector or frame.
 
         Parameters
         ----------
@@ -265,16 +267,6 @@ class ForceTurn:
         frame : int
             1 ground; 2 crank, i towards the crank pin; 3 rod, i along the rod from crank pin to slider pin, j perpendicular to
             rod and crank axis; 4 guide, the slider position increases along -k. Moments stay about the same points.
-
-        Returns
-        -------
-        masked array, shape (n, 3)
-            N or N.m.
-
-        Raises
-        ------
-        InputError
-            If there is no such vector or frame.
         """
         quantities.check_joint(name, frame)
         ground = self._joints[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
@@ -328,11 +329,9 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     """
     mechanism, acting = find_mechanism(parameters), []
     for name in variable_names(mechanism):
-        try:
+        with suppress(InputError):
             require_variable(parameters, drive, name)
-        except InputError:
-            continue
-        acting.append(name)
+            acting.append(name)
     if mechanism.switch_index < 0 or mechanism.is_switched_on(parameters.constants()):
         return tuple(acting)
     effect = differentiate_constants(parameters, acting).p[mechanism.switch_index]

@@ -206,7 +206,7 @@ def follow(
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
-    """Follow the branch through an orbit to an end of the range of the parameter.
+    """Follow the branch through an orbit to an end of the range of the parameter, or as far as possible: see `Branch.reason`.
 
     Parameters
     ----------
@@ -227,11 +227,6 @@ def follow(
         Called with the parameter of every point.
     stop : callable, optional
         Called with the orbit of every point; the branch ends when ``stop`` returns true.
-
-    Returns
-    -------
-    Branch
-        The branch as far as it could be followed; ``reason`` says why it ended.
 
     Raises
     ------
