@@ -199,7 +199,7 @@ class Builder:
             Further points, or all points of a body that is not a bar (m).
         mass, cog, inertia : optional
             Mass (kg), centre of mass (m), and moment of inertia about the centre of mass (kg.m2). By default the centre of
-            mass is the middle of the bar.
+            mass is the middle of the bar, or the origin of a body that is not a bar.
         section : mapping, optional
             Cross-section from which mass, centre of mass and inertia are computed: a ``material`` and a ``kind``, which is
             ``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``, ``"tube"`` with ``outer`` and ``inner``, or
@@ -275,15 +275,15 @@ class Builder:
         ratio : float
             Speed of the second gear divided by that of the first, relative to the third body; negative for external gears.
         phase : optional
-            Angle of the second gear when the angle of the first is zero (rad).
+            Angle of the second gear when the angle of the first is zero, both relative to the third body (rad).
         """
         return self._add("gears", name, bodies=bodies, ratio=ratio, phase=phase)
 
     def rack(self, name: str, *, gear: str, rack: str, radius: Amount, offset: Amount | None = None) -> Builder:
         """Add a toothed rack, which slides on the body to which its ``gear`` is pinned.
 
-        ``radius`` is the travel of the rack per radian of the gear (m), positive or negative. ``offset`` is the position of the
-        rack when the angle of the gear is zero (m).
+        ``radius`` is the travel of the rack per radian of the gear relative to that body (m), positive or negative. ``offset``
+        is the position of the rack when the angle of the gear is zero (m).
         """
         return self._add("racks", name, gear=gear, rack=rack, radius=radius, offset=offset)
 
@@ -314,18 +314,20 @@ class Builder:
         at : str, optional
             A pin or a slide.
         bodies : (str, str), optional
-            Two bodies whose relative rotation twists the spring.
+            Two bodies, which need not be joined: the rotation of the second relative to the first twists the spring. Whole
+            turns count if the angles of both follow from the freedoms alone, such as those of cranks and gears; otherwise the
+            twist is at most half a turn in either direction.
         stiffness, damping : optional
             Stiffness and damping in N/m and N.s/m; about a pin or between two bodies in N.m/rad and N.m.s/rad.
         free : optional
             Length, position (m) or angle (rad) at which the spring exerts no force.
         friction : optional
-            Level of Coulomb friction (N, N.m).
+            Level of Coulomb friction (N, N.m), smooth about rest.
         law : str or sequence of (x, force), optional
             A further force that opposes the stretch: a formula in the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or
-            a table of stretch and force (SI).
+            a table of stretch and force (SI), interpolated linearly. The work of this force counts as dissipated.
         constants : mapping, optional
-            Constants of the law, by their names in the formula.
+            Constants of the law, by their names in the formula; they become parameters of the mechanism.
         driven : bool, optional
             Whether an input adds a force that lengthens the spring, as a cylinder does, or a torque that twists it, as a motor
             does. A driven spring may also be at a joint whose coordinate is not a freedom.
@@ -350,10 +352,13 @@ class Builder:
         ----------
         name : str
         joint : str
+            A pin, whose coordinate is the angle of its second body relative to the first; or a slide, whose coordinate is the
+            position of the block.
         start : optional
             Initial angle or position (rad, m).
         speed : optional
-            Commanded rate (rad/s, m/s); for a freedom that is not driven, its initial rate.
+            Commanded rate (rad/s, m/s), at the start and as long as no input changes it; for a freedom that is not driven, its
+            initial rate. "0 rpm" commands rest.
         driven : bool, optional
             Whether its rate can be commanded. By default this is true only of the first freedom that has a speed; if none
             has one, of the first freedom.
@@ -435,7 +440,8 @@ def linkage(
     assembly : mapping of str to int, optional
         Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
     friction : mapping, optional
-        Friction that grows with the force in a joint: the friction radius of a pin (m), the coefficient of a slide or slot.
+        Coulomb friction proportional to the joint force, by the name of the joint: for a pin the friction radius (m), which is
+        coefficient times pin radius; for a slide or a slot the coefficient.
     loads : sequence, optional
         Points on which forces can act; ``{"point": "P", "frame": "body"}`` for a force in the axes of the body.
     torques : sequence of str, optional

@@ -70,23 +70,7 @@ _PLACE = Many(coordinate, length=2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """A moving body, described in its own coordinate frame.
-
-    Attributes
-    ----------
-    points : mapping of str to (x, y)
-        Coordinates of the body's points (m). Give points, or a ``bar``, or a bar and further points.
-    bar : tuple of str
-        Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
-    length : float
-        Length of the bar (m).
-    mass, inertia : float
-        Mass (kg) and moment of inertia about the centre of mass (kg.m2).
-    cog : tuple of float
-        Centre of mass (m); by default the body's origin, for a bar its midpoint.
-    section : table
-        Cross-section and material, which give mass, centre of mass and inertia: for a bar, or a plate with corners.
-    """
+    """A moving body, described in its own coordinate frame; see `Builder.body`."""
 
     points: Mapping[str, tuple[float, float]] = entry(_named_entries(_PLACE), factory=dict)
     bar: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -105,17 +89,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A straight line of a body.
-
-    Attributes
-    ----------
-    on : str
-        The body.
-    through : str
-        A point of the body on the line, from which positions along the line are measured.
-    direction : float
-        Direction of the line in the body (rad).
-    """
+    """A straight line of the body ``on`` through its point ``through``, from which positions along the line are measured."""
 
     on: str = entry(_name)
     through: str = entry(_name)
@@ -124,13 +98,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slide(Line):
-    """A block that slides along a line of another body, by default of the ground, without rotating relative to it.
-
-    Attributes
-    ----------
-    body : str
-        The block: its origin is on the line, and its x axis along it.
-    """
+    """A block that slides along a line of another body without rotating relative to it; see `Builder.slide`."""
 
     on: str = entry(_name, GROUND)
     body: str = entry(_name)
@@ -138,30 +106,14 @@ class Slide(Line):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slot(Line):
-    """A straight slot in a body, and a pin of another body in the slot.
-
-    Attributes
-    ----------
-    pin : str
-        The point in the slot.
-    """
+    """A straight slot in a body, and a pin of another body in the slot; see `Builder.slot`."""
 
     pin: str = entry(_name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gear:
-    """A pair of gears: two bodies, each pinned to the same third body.
-
-    Attributes
-    ----------
-    bodies : tuple of str
-        The gears.
-    ratio : float
-        Speed of the second gear divided by that of the first, relative to the third body; negative for external gears.
-    phase : float
-        Angle of the second gear when the angle of the first is zero, both relative to the third body (rad).
-    """
+    """A pair of gears: two bodies, each pinned to the same third body; see `Builder.gear`."""
 
     bodies: tuple[str, str] = entry(Many(_name, length=2))
     ratio: float = entry(Quantity("1"))
@@ -172,14 +124,7 @@ class Gear:
 class Rack:
     """A toothed rack and its gear on a carrier body: the gear is pinned to the carrier; rack and carrier slide on each other.
 
-    Attributes
-    ----------
-    gear, rack : str
-        The bodies.
-    radius : float
-        Pitch radius of the gear (m): travel of the slide per radian of the gear relative to the carrier; of either sign.
-    offset : float
-        Position of the slide when the angle of the gear is zero (m).
+    See `Builder.rack`.
     """
 
     gear: str = entry(_name)
@@ -192,29 +137,7 @@ class Rack:
 class Spring:
     """A spring with damper and dry friction: between two points, about a pin, along a slide, or as a shaft between two bodies.
 
-    Attributes
-    ----------
-    between : tuple of str
-        Two points. Give one of ``between``, ``at`` and ``bodies``.
-    at : str
-        A pin or a slide.
-    bodies : tuple of str
-        Two bodies, which need not be joined. The twist is the angle of the second body relative to the first, minus the angle
-        ``free``. Whole turns count if the angles of both follow from the freedoms alone, such as those of cranks and gears;
-        otherwise the twist is at most half a turn in either direction.
-    stiffness, damping : float
-        Stiffness and damping in N/m and N.s/m; of a torsion spring in N.m/rad and N.m.s/rad.
-    free : float
-        Length, position (m) or angle (rad) at which the spring exerts no force.
-    friction : float
-        Level of Coulomb friction (N, N.m), smooth about rest.
-    law : str or list of (x, force)
-        A further force that opposes the stretch: a formula in the stretch x and its rate v, such as "2e5*x**3 + 4*v", or a
-        table of stretch and force, which is interpolated linearly. The work of this force counts as dissipated.
-    constants : mapping of str to (float, str)
-        Values and units of the constants in the formula, by name. The constants become parameters of the mechanism.
-    driven : bool
-        Whether an input drives the spring with a force that lengthens it, as a cylinder does, or a torque that twists it.
+    See `Builder.spring`. ``constants`` are values and units of the constants of the law, by name.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -231,15 +154,7 @@ class Spring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointLoad:
-    """An input force at a point.
-
-    Attributes
-    ----------
-    point : str
-        Name of the point, on a moving body; if several bodies are pinned there, the force acts on the first.
-    frame : str
-        Axes of the components: ``ground``, or ``body`` for the axes of the body on which the force acts.
-    """
+    """An input force at a point of a moving body, the first of those pinned there; its components are in the axes ``frame``."""
 
     point: str = entry(_name)
     frame: str = entry(files.Choice((GROUND, BODY)), GROUND)
@@ -252,22 +167,7 @@ def _load(value: Any, name: str) -> PointLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreedomTable:
-    """A degree of freedom: a joint whose coordinate is independent.
-
-    Attributes
-    ----------
-    joint : str
-        A pin, whose coordinate is the angle of its second body relative to the first; or a slide, whose coordinate is the
-        position of the block.
-    start : float
-        Initial coordinate (rad, m).
-    speed : float
-        Commanded rate, at the start and as long as no input changes it (rad/s, m/s). The whole number 0 means that no rate is
-        commanded; "0 rpm" commands rest. For a freedom that is not driven: its initial rate.
-    driven : bool
-        Whether its rate can be commanded. By default this is true only of the first freedom that has a speed; if none has
-        one, of the first freedom.
-    """
+    """A degree of freedom: a joint whose coordinate is independent; see `Builder.freedom`."""
 
     joint: str = entry(_name)
     start: Any = entry(files.any_value, 0)
@@ -282,33 +182,9 @@ def _freedom(value: Any, name: str) -> FreedomTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
-    """A planar linkage.
+    """A planar linkage: the entries that `linkage` and the methods of `Builder` explain, in SI.
 
-    Attributes
-    ----------
-    name : str
-        Letters, digits and hyphens.
-    title, source : str
-        Title, and source of the data.
-    ground : mapping of str to (x, y)
-        Points of the ground (m).
-    bodies, slides, slots, gears, racks, springs : mapping
-        Parts of the linkage, by name.
-    freedoms : mapping of str to FreedomTable
-        One to four degrees of freedom, by name; if none is given, they are chosen automatically.
-    assembly : mapping of str to int
-        Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
-    friction : mapping
-        Coulomb friction proportional to the joint force, by the name of the joint: for a pin the friction radius (m), which is
-        coefficient times pin radius; for a slide or a slot the coefficient.
-    loads : tuple of PointLoad
-        Forces that can act on points; in the axes of the ground if only the point is named.
-    torques : tuple of str
-        Bodies on which torques can act.
-    gravity : float
-        Acceleration of gravity (m/s2).
-    gravity_direction : float
-        Direction of gravity (rad).
+    There are one to four freedoms; if none is given, they are chosen automatically.
     """
 
     name: str = entry(files.text)

@@ -156,22 +156,9 @@ MECHANISM = Mechanism(
 
 
 class Package:
-    """Python package of one linkage, as source texts.
+    """Python package of one linkage, as source texts; if the description is wrong, LinkageError or ParameterError is raised.
 
-    Attributes
-    ----------
-    description : Description
-    structure : Structure
-    motion : Motion
-    name : str
-        Name of the linkage as a Python identifier, with a hash of the texts.
-    files : dict of str to str
-        Texts by file name.
-
-    Raises
-    ------
-    LinkageError, ParameterError
-        If the description is wrong.
+    ``files`` are the texts by file name; ``name`` is the name of the linkage as a Python identifier, with a hash of the texts.
     """
 
     def __init__(self, description: Description) -> None:
@@ -192,15 +179,8 @@ class Package:
     def mechanism(self, folder: Path | None = None) -> Mechanism:
         """Import the package, register its mechanism and return it.
 
-        Parameters
-        ----------
-        folder : path, optional
-            Folder in which the package is stored; by default one in the user's cache.
-
-        Raises
-        ------
-        LinkageError
-            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the same name.
+        The package is stored in ``folder``, by default one in the user's cache. If the bodies cannot be joined at the start, or
+        a mechanism of Linkwork has the same name, LinkageError is raised.
         """
         name = self.description.name
         known = MECHANISMS.get(name)
@@ -225,17 +205,19 @@ class Package:
             if other.name != name and other.fmu == made.fmu:
                 of = f"its FMU would be called {made.fmu}, like that of {other.name}"
                 raise LinkageError(f"linkage.name is {name}: {of}; it must have another name")
-        start = made.published[name]
+        start, module = made.published[name], made.modules[-1]
+        x, p = made.state(start.initial), start.parameters.constants()
         try:
-            made.check_assembly(made.state(start.initial), start.parameters.constants())
+            made.check_assembly(x, p)
         except AssemblyError as error:
             signs = ", linkage.assembly" if any(dyad.has_two_assemblies for dyad in self.structure.dyads) else ""
             raise LinkageError(
-                f"{error}{self._unreachable(made)}: change the start in linkage.freedoms{signs} or the lengths"
+                f"{error}{self._unreachable(module, x, p)}: change the start in linkage.freedoms{signs} or the lengths"
             ) from None
-        self._check_lines(made)
-        self._check_motion(made)
-        self._check_twists(made)
+        places = module.places(x, p)
+        self._check_lines(places)
+        self._check_motion(made, x, p, places)
+        self._check_twists(p, places)
         MECHANISMS.pop(name, None)
         try:
             register(made)
@@ -245,11 +227,12 @@ class Package:
             raise
         return made
 
-    def _unreachable(self, made: Mechanism) -> str:
+    # below x is the state at the start, p are the constants, and places is what the equations compute from both
+
+    def _unreachable(self, module: Any, x: Any, p: Any) -> str:
         """Return a phrase that names two bodies that cannot be joined at the start; empty if all bodies can be joined."""
-        start = made.published[made.name]
         try:
-            made.modules[-1].places(made.state(start.initial), start.parameters.constants())
+            module.places(x, p)
         except (ValueError, ArithmeticError) as error:
             lines = [at.line or "" for at in extract_tb(error.__traceback__) if at.name == "places"]
             *_, (frame, _) = walk_tb(error.__traceback__)
@@ -265,10 +248,8 @@ class Package:
                     return f", {bodies}, joined at {dyad.inner.name}{sizes}"
         return ""
 
-    def _check_lines(self, made: Mechanism) -> None:
+    def _check_lines(self, places: Any) -> None:
         """Raise LinkageError if at the start the two pins that give a line its direction coincide."""
-        start = made.published[made.name]
-        places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for dyad in self.structure.dyads:
             if dyad.kind == "RPR":
                 one, other = (getattr(places, f"at_{side.joint.name}") for side in dyad.sides)
@@ -280,20 +261,16 @@ class Package:
                         "start in linkage.freedoms, linkage.assembly or the lengths"
                     )
 
-    def _check_motion(self, made: Mechanism) -> None:
+    def _check_motion(self, made: Mechanism, x: Any, p: Any, places: Any) -> None:
         """Raise LinkageError if the accelerations at the start are not finite."""
-        start = made.published[made.name]
-        x, p = made.state(start.initial), start.parameters.constants()
         try:
             if all(map(isfinite, made.equations.derivative(x, made.idle_inputs(p), p))):
                 return
         except (ValueError, TypeError, ArithmeticError):
             pass
-        springs = self.description.springs.items()
-        places = made.modules[-1].places(x, p)
-        laws = [
-            f"the law of linkage.springs.{name}" for name, s in springs if s.law and not self._has_force(made, name)
-        ]
+        springs, module = self.description.springs.items(), made.modules[-1]
+        lawless = (name for name, spring in springs if spring.law and not self._has_force(module, x, p, name))
+        laws = [f"the law of linkage.springs.{name}" for name in lawless]
         for name, spring in springs:
             if spring.between:
                 (one, other) = (getattr(places, f"at_{own}") for own in spring.between)
@@ -307,10 +284,8 @@ class Package:
         causes = " or ".join(laws or (masses,))
         raise LinkageError(f"the accelerations at the start are not finite numbers: change {causes.removesuffix(',')}")
 
-    def _has_force(self, made: Mechanism, name: str) -> bool:
+    def _has_force(self, module: Any, x: Any, p: Any, name: str) -> bool:
         """Return whether the law of a spring has a finite value at the start."""
-        start = made.published[made.name]
-        x, p, module = made.state(start.initial), start.parameters.constants(), made.modules[-1]
         try:
             s = module.springs(module.places(x, p), x, p)
             stretch, rate = getattr(s, f"{name}_stretch"), getattr(s, f"{name}_rate")
@@ -319,19 +294,17 @@ class Package:
         except (ValueError, TypeError, ArithmeticError):
             return False
 
-    def _check_twists(self, made: Mechanism) -> None:
+    def _check_twists(self, p: Any, places: Any) -> None:
         """Raise LinkageError if a torsion spring is twisted by more than half a turn at the start.
 
         Springs between bodies whose turns the freedoms count are not checked.
         """
-        start = made.published[made.name]
-        places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
             bodies = () if name in self.motion.counted else self.interface.twisted_bodies(spring)
             if not bodies or not is_given(spring.free):
                 continue
             one, other = (0.0 if b == GROUND else planar.turn_angle(getattr(places, f"{b}_frame").turn) for b in bodies)
-            free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
+            free, angle = getattr(p, f"{name}_free_angle"), remainder(other - one, tau)
             shorter = remainder(angle - free, tau)
             # an angle may be meant in (-pi, pi] or in [0, 2 pi)
             if min(abs(angle - free), abs(angle % tau - free)) > pi + 1e-9:

@@ -5,9 +5,9 @@ have the functions that sections 2.3, 3.2 and 4.2 of FMI 3.0 list as allowed in 
 divided, as the text of the standard describes: `ready` is the state Instantiated after `SetupExperiment`, and `settled` is the
 event mode after an update that needs no further update. In FMI 3.0 `error` is the state Terminated, to which an error leads.
 
-The cell of a function and a state is `x`: allowed; `.`: not allowed; `?`: not judged, because the standard does not decide;
-`e`: allowed if the importer uses the event mode; another letter or a digit: allowed for some variables, see
-`model.CONDITIONS`, where the digits are the standard's footnotes.
+A row with ``{type}`` is of the functions of all types of FMI 2. The cell of a function and a state is `x`: allowed; `.`: not
+allowed; `?`: not judged, because the standard does not decide; `e`: allowed if the importer uses the event mode; another letter
+or a digit: allowed for some variables, see `model.CONDITIONS`, where the digits are the standard's footnotes.
 """
 
 from __future__ import annotations
@@ -15,16 +15,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-_FMI2 = """
-SetDebugLogging              x
-Reset                        x
-GetFMUstate                  x
-SetFMUstate                  x
-FreeFMUstate                 x
-SerializedFMUstateSize       x
-SerializeFMUstate            x
-DeSerializeFMUstate          x
-"""
+#: Functions that are allowed in every state.
+_FMI2 = (
+    "SetDebugLogging Reset GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate"
+)
+_FMI3 = _FMI2.replace("FMUstate", "FMUState").replace("DeS", "Des")
 
 _FMI2_CS = """
                              instantiated ready initialization step failed terminated error
@@ -32,24 +27,15 @@ SetupExperiment              x ? . . . . .
 EnterInitializationMode      ? x . . . . .
 ExitInitializationMode       . . x . . . .
 Terminate                    . . . x x . .
-GetReal                      . . 2 x x x x
-GetInteger                   . . 2 x x x x
-GetBoolean                   . . 2 x x x x
-GetString                    . . 2 x x x x
-SetReal                      1 1 3 6 . . .
-SetInteger                   1 1 3 6 . . .
-SetBoolean                   1 1 3 6 . . .
-SetString                    1 1 3 6 . . .
+Get{type}                    . . 2 x x x x
+Set{type}                    1 1 3 6 . . .
 GetDirectionalDerivative     . . x x x x x
 SetRealInputDerivatives      x x x x . . .
 GetRealOutputDerivatives     . . . x x x x
 DoStep                       . . . x ? . .
 CancelStep                   . . . . . . .
 GetStatus                    . . . x x x .
-GetRealStatus                . . . x x x .
-GetIntegerStatus             . . . x x x .
-GetBooleanStatus             . . . x x x .
-GetStringStatus              . . . x x x .
+Get{type}Status              . . . x x x .
 """
 
 _FMI2_ME = """
@@ -58,10 +44,7 @@ SetupExperiment              x ? . . . . . .
 EnterInitializationMode      ? x . . . . . .
 ExitInitializationMode       . . x . . . . .
 Terminate                    . . . x x x . .
-GetReal                      . . 2 x x x x x
-GetInteger                   . . 2 x x x x x
-GetBoolean                   . . 2 x x x x x
-GetString                    . . 2 x x x x x
+Get{type}                    . . 2 x x x x x
 SetReal                      1 1 3 4 4 5 . .
 SetInteger                   1 1 3 4 4 . . .
 SetBoolean                   1 1 3 4 4 . . .
@@ -77,17 +60,6 @@ GetEventIndicators           . . x x x x x x
 GetContinuousStates          . . x x x x x x
 GetDerivatives               . . x x x x x x
 GetNominalsOfContinuousStates x x x x x x x x
-"""
-
-_FMI3 = """
-SetDebugLogging              x
-Reset                        x
-GetFMUState                  x
-SetFMUState                  x
-FreeFMUState                 x
-SerializedFMUStateSize       x
-SerializeFMUState            x
-DeserializeFMUState          x
 """
 
 _FMI3_CS = """
@@ -127,6 +99,8 @@ GetNumberOfContinuousStates  x ? x x ? ?
 GetNumberOfEventIndicators   x ? x x ? ?
 """
 
+#: Types of variables of FMI 2, and of FMI 3 that change continuously, and that do not.
+_TYPES = ("Real", "Integer", "Boolean", "String")
 FLOATS = ("Float32", "Float64")
 DISCRETE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
 
@@ -183,8 +157,12 @@ class Machine:
 def _machine(version: int, interface: str, common: str, table: str) -> Machine:
     heading, *rows = table.strip().splitlines()
     states = tuple(heading.split())
-    allowed = {row.split()[0]: dict(zip(states, row.split()[1:], strict=True)) for row in rows}
-    allowed |= {row.split()[0]: dict.fromkeys(states, row.split()[1]) for row in common.strip().splitlines()}
+    allowed = {
+        name.replace("{type}", kind): dict(zip(states, cells, strict=True))
+        for name, *cells in map(str.split, rows)
+        for kind in _TYPES
+    }
+    allowed |= {function: dict.fromkeys(states, "x") for function in common.split()}
     if version == 3:
         # each type has its own functions; all variables can be read in every state, except that in Instantiated only variables
         # with a start value can be read

@@ -39,7 +39,9 @@ class Instance:
     the part can save and restore its state.
     """
 
+    #: FMPy's class; the types of real variables and, in the functions that set them, of enumerations
     _running: type = FMU2Slave
+    _reals, _enumerations = "Real", "Integer"
 
     def __init__(self, part: Part) -> None:
         self.part = part
@@ -57,6 +59,7 @@ class Instance:
             modelIdentifier=interface.modelIdentifier,
             instanceName=part.name,
         )
+        self._get_reals, self._set_reals = (getattr(self._fmu, f"{verb}{self._reals}") for verb in ("get", "set"))
         self._instantiate(interface)
 
     def _instantiate(self, interface: Any) -> None:
@@ -73,11 +76,8 @@ class Instance:
         for name, value in self.part.values.items():
             port = self.part.ports[name]
             kind = {"Real": float, "Float64": float, "Boolean": bool}.get(port.type, int)
-            # enumerations are set as integers in FMI 2.0, as 64-bit integers in FMI 3.0
             setter = port.type if port.type != "Enumeration" else self._enumerations
             getattr(self._fmu, f"set{setter}")([port.reference], [kind(value)])
-
-    _enumerations = "Integer"
 
     def finish_initialisation(self) -> None:
         """Leave initialisation mode."""
@@ -85,7 +85,7 @@ class Instance:
 
     def read(self) -> NDArray[np.float64]:
         """Return the values of all real outputs."""
-        return np.array(self._fmu.getReal(self._references))
+        return np.array(self._get_reals(self._references))
 
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
@@ -101,7 +101,7 @@ class Instance:
             values = values + middle * slopes
         self._values, self._slopes = values, slopes if slopes is not None and lines else np.zeros(len(values))
         if references:
-            self._fmu.setReal(references, values.tolist())
+            self._set_reals(references, values.tolist())
             if lines:
                 self._fmu.setRealInputDerivatives(references, [1] * len(references), self._slopes.tolist())
 
@@ -134,7 +134,7 @@ class Instance3(Instance):
     """An FMI 3.0 instance of a part: inputs have no derivatives, but can be updated at each step of the part's integrator."""
 
     _running = FMU3Slave
-    _enumerations = "Int64"
+    _reals, _enumerations = "Float64", "Int64"
 
     def _instantiate(self, interface: Any) -> None:
         self._begins, self._lines = 0.0, False
@@ -145,16 +145,12 @@ class Instance3(Instance):
     def _update(self, environment: Any, time: float, setting: bool, *_: Any) -> None:
         if setting and self._lines:
             self._last = self._values + (time - self._begins) * self._slopes
-            self._fmu.setFloat64(self._references_set, self._last.tolist())
+            self._set_reals(self._references_set, self._last.tolist())
 
     def start_initialisation(self) -> None:
         """Set the start values and enter initialisation mode."""
         self._set_start_values()
         self._fmu.enterInitializationMode(startTime=0.0)
-
-    def read(self) -> NDArray[np.float64]:
-        """Return the values of all real outputs."""
-        return np.array(self._fmu.getFloat64(self._references))
 
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
@@ -166,7 +162,7 @@ class Instance3(Instance):
         self._last = values if updated else values + middle * self._slopes
         self._references_set = references
         if references:
-            self._fmu.setFloat64(references, self._last.tolist())
+            self._set_reals(references, self._last.tolist())
 
     def end_values(self, step: float) -> Floats:
         """Return the values of the inputs at the end of a step, from the last update or extrapolated with the slopes."""
@@ -176,10 +172,6 @@ class Instance3(Instance):
         """Take a step as `Instance.step` does."""
         self._begins = time
         self._fmu.doStep(time, step)
-
-    def forget(self, state: Any) -> None:
-        """Free a saved state."""
-        self._fmu.freeFMUState(state)
 
 
 def make_instance(part: Part) -> Instance:
