@@ -17,13 +17,14 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from analysis import figures
 from analysis.systems import Convergence, JoinedSystem, convergence, library, load_system, write_ssp
 from tests.fmu.runner import run_in_process
 from tests.systems import masters
 from tests.systems.conftest import started_in_its_modes
+
+from . import tables
 
 #: Number of communication steps of a run at the greatest step.
 POINTS = 20
@@ -40,9 +41,7 @@ CONSOLE = Console(width=128)
 
 def show(found: Convergence, powers: bool = True) -> None:
     """Print errors and orders; with ``powers`` also each error divided by the share of work that the coupling has added."""
-    table = Table(title=f"{found.title}: greatest relative error")
-    for name in ("step [ms]", *found.errors):
-        table.add_column(name, justify="right")
+    table = tables.numbers(f"{found.title}: greatest relative error", ("step [ms]", *found.errors))
     for n, step in enumerate(found.steps):
         table.add_row(f"{1e3 * step:.4g}", *(f"{errors[n]:.1e}" for errors in found.errors.values()))
     table.add_row("order", *(f"{found.order(way):.2f}" for way in found.errors))

@@ -22,6 +22,8 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
+from . import tables
+
 #: Code for Python and its arguments, by name; the code runs in a folder of its own, into which it writes its files.
 COMMAND = "from analysis.cli import main; main()"
 WAITS = {
@@ -64,31 +66,23 @@ def measure_first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, st
         return measure_waiting((code if carried else WITHOUT + code, *others), folder)
 
 
+def _empty_table(title: str, *states: str) -> Table:
+    """Return a table with the three numbers of `measure_waiting` for each state of the cache."""
+    headings = (heading for state in states for heading in (state, "s", "compiled"))
+    return tables.numbers(f"{title}; seconds by the clock, of the processor; compilations", ("", *headings))
+
+
 def linkages(names: list[str]) -> Table:
     """Return a table of the time that each linkage takes from its file to a run and to a native FMU."""
-    table = Table(title="from file; seconds by the clock, of the processor; compilations")
-    for heading in (
-        "",
-        *("no kernels", "s", "compiled"),
-        *("empty cache", "s", "compiled"),
-        *("another before", "s", "compiled"),
-        *("again", "s", "compiled"),
-    ):
-        table.add_column(heading, justify="right" if heading else "left")
+    table = _empty_table("from file", "no kernels", "empty cache", "another before", "again")
     for name in names:
         for what, command in FROM_A_FILE.items():
             measured, other = ((*command, str(LIBRARY / f"{own}.toml")) for own in (name, BEFORE))
-            bare = measure_first(measured, carried=False)
-            alone = measure_first(measured, carried=True)
+            empty = [*measure_first(measured, carried=False), *measure_first(measured, carried=True)]
             with tempfile.TemporaryDirectory() as folder:
                 measure_waiting(other, folder)
-                table.add_row(
-                    f"{name}: {what}",
-                    *bare,
-                    *alone,
-                    *measure_waiting(measured, folder),
-                    *measure_waiting(measured, folder),
-                )
+                filled = [text for _ in range(2) for text in measure_waiting(measured, folder)]
+                table.add_row(f"{name}: {what}", *empty, *filled)
     return table
 
 
@@ -97,9 +91,7 @@ def main() -> None:
     if sys.argv[1:2] == ["linkages"]:
         Console(width=180).print(linkages(sys.argv[2:] or list(MEASURED)))
         return
-    table = Table(title="seconds by the clock, of the processor; compilations")
-    for heading in ("", *("no kernels", "s", "compiled"), *("first", "s", "compiled"), *("again", "s", "compiled")):
-        table.add_column(heading, justify="right" if heading else "left")
+    table = _empty_table("installation", "no kernels", "first", "again")
     for what, arguments in WAITS.items():
         with tempfile.TemporaryDirectory() as folder:
             bare = measure_first(arguments, carried=False) if what not in IDLE else ("", "", "")

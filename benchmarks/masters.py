@@ -156,22 +156,19 @@ def _watch(folder: Path) -> None:
 def material(folder: Path, on: str) -> Path:
     """Return the path of the FMU or archive of this name, which logs all calls; make it if it is not in the folder."""
     name = {"jump": "FMI 2.0", "limit": "FMI 2.0"}.get(on, on)
-    target = folder / f"{name}.{'fmu' if name.startswith('FMI') else 'ssp'}"
+    alone = name.startswith("FMI")
+    target = folder / f"{name}.{'fmu' if alone else 'ssp'}"
     if target.exists():
         return target
-    match name:
-        case "archive":
-            wiring = system_of("motor-crank").without_rates().wiring()
-            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
-        case "archive 3":
-            wiring = system_of("motor-crank").without_rates().wiring(fmi=3)
-            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
-        case "started":
-            wiring = started_in_its_modes("motor-crank", folder)
-            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
-        case "wrong":
-            return changed(material(folder, "archive"), target, _cross)
-    return watched(build_native(FIVE_BAR, NATIVE if name == "FMI 2.0" else NATIVE_FMI3, folder), target)
+    if alone:
+        return watched(build_native(FIVE_BAR, NATIVE if name == "FMI 2.0" else NATIVE_FMI3, folder), target)
+    if name == "wrong":
+        return changed(material(folder, "archive"), target, _cross)
+    if name == "started":
+        wiring = started_in_its_modes("motor-crank", folder)
+    else:
+        wiring = system_of("motor-crank").without_rates().wiring(fmi=3 if name == "archive 3" else 2)
+    return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
 
 
 def lines(run: Run, material: Path) -> set[str]:

@@ -18,9 +18,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from analysis.systems import Wiring, build_host, library, load_system, run_system
+
+from . import tables
 
 RATES = (1000, 4000)
 REAL_TIME = ("chrt", "--fifo", "50")
@@ -84,17 +85,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for rate in RATES
             for way, by in ways.items()
         }
-    table = Table(title=f"{wiring.title}: a communication step of the C program, microseconds, on {processor()}")
-    for heading in ("run", "steps", *(p.replace("%", " %") for p in PERCENTILES)):
-        table.add_column(heading, justify="left" if heading == "run" else "right")
+    percentiles = [name.replace("%", " %") for name in PERCENTILES]
+    title = f"{wiring.title}: a communication step of the C program, microseconds, on {processor()}"
+    table = tables.numbers(title, ("run", "steps", *percentiles), ("run",))
     rows = {f"as fast as possible, {1e3 * wiring.step:g} ms": free}
     rows |= {f"{rate / 1000:g} kHz{way}": run for (way, rate), run in paced.items()}
     for what, run in rows.items():
         table.add_row(what, f"{run['steps']:.0f}", *(f"{run[f'step_us_{p}']:.1f}" for p in PERCENTILES))
     console.print(table)
-    report = Table(title="Deadlines missed, and how late a step began, microseconds")
-    for heading in ("run", "deadlines", "missed", "latest", *(p.replace("%", " %") for p in PERCENTILES)):
-        report.add_column(heading, justify="left" if heading == "run" else "right")
+    title = "Deadlines missed, and how late a step began, microseconds"
+    report = tables.numbers(title, ("run", "deadlines", "missed", "latest", *percentiles), ("run",))
     for (way, rate), run in paced.items():
         counts = (f"{run[name]:.0f}" for name in ("steps", "deadlines_missed", "latest_us"))
         report.add_row(f"{rate / 1000:g} kHz{way}", *counts, *(f"{run[f'wake_us_{p}']:.1f}" for p in PERCENTILES))

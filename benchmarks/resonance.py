@@ -9,9 +9,6 @@ changes them.
 """
 
 import argparse
-import resource
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,19 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
+
+from . import tables
+from .first import COMMAND, measure_waiting
 
 #: Defaults of the command: range of speeds relative to the natural frequency, and how many period doublings are followed.
 RANGE, DOUBLINGS = (0.15, 2.3), 3
-
-
-def command(name: str, folder: str) -> float:
-    """Return the processor time (s) of the whole command on a published set."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    arguments = [sys.executable, "-m", "analysis.cli", "resonance", "--published", name, "--out", folder]
-    subprocess.run(arguments, capture_output=True, check=False)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def parts(name: str, folder: str) -> dict[str, float]:
@@ -75,12 +65,11 @@ def parts(name: str, folder: str) -> dict[str, float]:
 
 def main(name: str) -> None:
     """Measure the command and its parts, and print the times."""
-    table = Table(title=f"linkwork resonance --published {name}, processor time")
-    table.add_column("")
-    table.add_column("s", justify="right")
+    table = tables.numbers(f"linkwork resonance --published {name}, processor time", ("", "s"))
+    command = (COMMAND, "resonance", "--published", name, "--out", "out")
     with tempfile.TemporaryDirectory() as folder:
-        command(name, folder)
-        table.add_row("the command, warm", f"{command(name, folder):.2f}")
+        measure_waiting(command, folder)
+        table.add_row("the command, warm", measure_waiting(command, folder)[1])
         for part, seconds in parts(name, folder).items():
             table.add_row(f"  {part}", f"{seconds:.2f}")
     Console(width=100).print(table)

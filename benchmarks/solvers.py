@@ -13,9 +13,8 @@ from functools import partial
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from benchmarks import engines
+from benchmarks import engines, tables
 from benchmarks.accuracy import (
     ACCURACY,
     SCIPY_METHODS,
@@ -110,9 +109,8 @@ def main() -> None:
                 timings.append(time_engine(engine, case))
             except ImportError as error:
                 missing += [error.name or str(error)] * (error.name not in missing)
-        table = Table(title=f"{case.name}: error in u at most {ACCURACY:g}")
-        for heading in ("solver", "error", "time [ms]", "times the integration", "times the whole call", "setting"):
-            table.add_column(heading, justify="left" if heading in ("solver", "setting") else "right")
+        headings = ("solver", "error", "time [ms]", "times the integration", "times the whole call", "setting")
+        table = tables.numbers(f"{case.name}: error in u at most {ACCURACY:g}", headings, ("solver", "setting"))
         for timing in timings:
             table.add_row(
                 timing.solver,

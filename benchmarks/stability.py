@@ -20,7 +20,6 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
 from analysis.periodic import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive, Plane, grid, plane
@@ -28,6 +27,8 @@ from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS
+
+from . import tables
 
 POINTS = 200
 #: Number of rows in the sample, and number of points in each.
@@ -115,9 +116,8 @@ def main(points: int = POINTS, cores: int = 2) -> None:
     difference = max(
         float(np.abs(chart.largest[row, piece] - values).max()) for row, piece, values in zip(rows, pieces, sample)
     )
-    table = Table(title=f"{points} x {points} largest Floquet multipliers of the true orbit, {cores} core(s)")
-    for heading in ("", "s", "ms a point and core", "ratio"):
-        table.add_column(heading, justify="right" if heading else "left")
+    title = f"{points} x {points} largest Floquet multipliers of the true orbit, {cores} core(s)"
+    table = tables.numbers(title, ("", "s", "ms a point and core", "ratio"))
     per_point = 1e3 * cores / points**2
     table.add_row("periodic.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
     table.add_row("the same again, from the cache on disk", f"{again:.2f}", "", "")

@@ -40,6 +40,7 @@ from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
+from . import tables
 from .black_box import DRAWS, BlackBox, minimise_score
 from .contest import PlacedFourBar
 
@@ -215,9 +216,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
 def kernel_table() -> Table:
     """Measure and return the first table, of coupler curves and Jacobians."""
     times = kernel_times(PROBLEMS["ellipse-a"].linkage)
-    table = Table(title=f"coupler curve of {N} points")
-    for heading in ("", "microseconds", "times the compiled curve"):
-        table.add_column(heading, justify="right" if heading else "left")
+    table = tables.numbers(f"coupler curve of {N} points", ("", "microseconds", "times the compiled curve"))
     first = next(iter(times.values()))
     for name, seconds in times.items():
         table.add_row(name, f"{1e6 * seconds:.2f}", f"{seconds / first:.1f}")
@@ -229,9 +228,7 @@ def problem_table(names: Sequence[str]) -> Table:
     # machine code, CasADi and the workers are loaded before the timing begins
     for search in SETTINGS.values():
         _run_problem("ellipse-a", search)
-    table = Table(title="problems of chapter VI: error in the thesis's unit, and seconds")
-    for heading in ("problem", *SETTINGS):
-        table.add_column(heading)
+    table = Table("problem", *SETTINGS, title="problems of chapter VI: error in the thesis's unit, and seconds")
     for name in names:
         problem = PROBLEMS[name]
         table.add_row(
@@ -251,9 +248,9 @@ def _run_problem(name: str, search: Search) -> str:
 
 def start_table() -> Table:
     """Measure and return the third table, of the results from many starts."""
-    table = Table(title=f"ellipse a with bounds only, {STARTS} starts")
-    for heading in ("path", "starts", "method", "at the optimum", "ms a start", "times least squares"):
-        table.add_column(heading, justify="left" if heading in ("path", "starts", "method") else "right")
+    texts = ("path", "starts", "method")
+    headings = (*texts, "at the optimum", "ms a start", "times least squares")
+    table = tables.numbers(f"ellipse a with bounds only, {STARTS} starts", headings, texts)
     for weighted in (False, True):
         cases = {kind: convergence(weighted, kind == "scan") for kind in ("scan", "random")}
         best = min(q for found in cases.values() for s in found for q in s.qualities)

@@ -117,10 +117,7 @@ _PRIMITIVE = {"bool", "string", "f32", "f64", *(f"{sign}{bits}" for sign in "su"
 def component(module: bytes) -> bytes:
     """Wrap the core WebAssembly module of an FMU as a WebAssembly component, and return it.
 
-    Raises
-    ------
-    MissingLibraryError
-        If wasmtime, which assembles the component's text to binary, is not installed.
+    MissingLibraryError is raised if wasmtime, which assembles the component's text to binary, is not installed.
     """
     frame = _frame()
     # put the module in the place of the frame's second core module, which is empty; a section is number, length and content

@@ -38,18 +38,10 @@ References = frozenset[int]
 
 
 class Kind(NamedTuple):
-    """A kind of FMU.
+    """A kind of FMU: major version of FMI, program that generates it, and interface types, each with its capability flags.
 
-    Attributes
-    ----------
-    fmi : int
-        Major version of FMI.
-    suffix : str
-        End of the model identifier, after the name of the mechanism's FMU. The file name has hyphens in place of underscores.
-    tool : str
-        Program that generates the FMU.
-    interfaces : mapping
-        Interface types, each with its capability flags.
+    ``suffix`` is the end of the model identifier, after the name of the mechanism's FMU. The file name has hyphens in place of
+    underscores.
     """
 
     fmi: int
@@ -133,14 +125,8 @@ def token(mechanism: Mechanism, kind: Kind) -> str:
 def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
     """Return ``modelDescription.xml`` of an FMU.
 
-    The same mechanism gives the same bytes; the date of generation is written only if ``SOURCE_DATE_EPOCH`` sets it.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    kind : Kind
-    sources : sequence of str
-        Files to compile, below ``sources/`` of the archive; FMI 2.0 lists them here, FMI 3.0 in `build_description`.
+    The same mechanism gives the same bytes; the date of generation is written only if ``SOURCE_DATE_EPOCH`` sets it. FMI 2.0
+    lists the files to compile here, by their paths below ``sources/`` of the archive, FMI 3.0 in `build_description`.
     """
     entries = _entries(mechanism, kind)
     root = Element(

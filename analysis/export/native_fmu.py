@@ -90,13 +90,7 @@ _NOTES = (
 
 
 def this_platform() -> str:
-    """Return the name of the platform that this process runs on.
-
-    Raises
-    ------
-    BuildError
-        If this platform is not in `PLATFORMS`.
-    """
+    """Return the name of the platform that this process runs on; raise BuildError if it is not in `PLATFORMS`."""
     architecture = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine.machine().lower(), machine.machine().lower())
     name = f"{architecture}-{machine.system().lower()}"
     if name not in PLATFORMS:
@@ -227,15 +221,10 @@ def compile_library(
 
     Parameters
     ----------
-    folder : path
     files : sequence of str
         Paths of the C files, in the folder or elsewhere.
-    library : str
-        Name of the library.
     target : str
         Platform by its name in Zig.
-    options : sequence of str
-        Options of the compiler.
     kept : bool
         Whether the library is kept in the cache, and taken from there if it was compiled before by the same version of Zig
         and of this module with the same options from the same files. The files are then all sources: those of the folder,

@@ -168,14 +168,9 @@ _CONTROLLER = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\
 
 
 def build_controller(name: str, dest: Path | str = "build") -> Path:
-    """Build the Python FMU of a controller and return its path, in a subfolder named by the hash of its content.
+    """Build the Python FMU of a controller, a key of `controllers.CONTROLLERS`, and return its path.
 
-    Parameters
-    ----------
-    name : str
-        A key of `controllers.CONTROLLERS`.
-    dest : path
-        Folder in which the subfolder is made; an FMU that is already there is kept.
+    It is in a subfolder of ``dest`` named by the hash of its content; an FMU that is already there is kept.
     """
     text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
     guard = (SOURCES / "guard.c").read_bytes()
@@ -233,22 +228,9 @@ _OPTIONS = {
 def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
     """Put the guard in the place of PythonFMU's libraries, which are renamed; return all files by path.
 
-    The source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the master
-    gives.
-
-    Parameters
-    ----------
-    entries : mapping
-        Content of the files by path in the archive, as PythonFMU's builder makes it.
-    model : str
-        Model identifier of the FMU.
-    source : bytes
-        C source of the guard.
-
-    Raises
-    ------
-    BuildError
-        If the source does not compile.
+    The C source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the
+    master gives. ``entries`` are the files by path in the archive, as PythonFMU's builder makes it, ``model`` is the model
+    identifier. BuildError is raised if the source does not compile.
     """
     guid = ElementTree.fromstring(entries["modelDescription.xml"]).attrib["guid"]
     found = {**entries, SOURCE: source, "resources/guid.txt": guid.encode()}

@@ -37,10 +37,8 @@ _ANGLES = (-2.0, -0.7, 0.3, 1.9)
 def law(value: Any, name: str) -> Law:
     """Read a force law: a formula, or the rows (x, force) of a table, whose units depend on the joint (see `expression`).
 
-    Raises
-    ------
-    ParameterError
-        If a formula has anything but names, arithmetic and the known functions, or a table has fewer than two rows.
+    ParameterError is raised if a formula has anything but names, arithmetic and the known functions, or a table fewer than two
+    rows.
     """
     if isinstance(value, list):
         return _ROWS(value, name)
@@ -69,10 +67,7 @@ def law(value: Any, name: str) -> Law:
 def expression(law: Law, about: bool, name: str) -> str:
     """Return a force law as an expression in x, v and the constants; ``about`` is true if x is an angle, not a length.
 
-    Raises
-    ------
-    ParameterError
-        If a quantity in a table has another dimension, or x does not increase from row to row.
+    ParameterError is raised if a quantity in a table has another dimension, or x does not increase from row to row.
     """
     if isinstance(law, str):
         return ast.unparse(_WithoutBranches().visit(ast.parse(law, mode="eval")))

@@ -13,12 +13,9 @@ from .laws import check_law
 
 
 def check_entries(description: Description) -> None:
-    """Check that the entries of a description fit together.
+    """Check that the entries of a description fit together; raise LinkageError or ParameterError if one does not fit.
 
-    Raises
-    ------
-    LinkageError, ParameterError
-        If an entry does not fit. The message says where it is in the file, and what would be right.
+    The message says where it is in the file, and what would be right.
     """
     d = description
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):

@@ -92,18 +92,9 @@ class Load(NamedTuple):
 class Interface:
     """The FMI interface of a described linkage: parameters, freedoms, loads, and the expressions of its points.
 
-    Attributes
-    ----------
-    description : Description
-    structure : Structure
-    parameters : tuple of Parameter
-    drives : tuple of Drive
-        The degrees of freedom, in the order of the coordinates.
-    loads : tuple of Load
-    points : mapping
-        Coordinates of each point in the frame of its body, as expressions in the parameters.
-    centres : mapping
-        Coordinates of the centre of mass of each body, also as expressions in the parameters; massless bodies are left out.
+    ``drives`` are the degrees of freedom, in the order of the coordinates. ``points`` and ``centres`` have the coordinates of
+    each point and of the centre of mass of each body that has a mass, in the frame of the body, as expressions in the
+    parameters.
     """
 
     description: Description
@@ -219,13 +210,7 @@ def rotations(description: Description, structure: Structure, freedom: int) -> d
 
 
 def interface(description: Description, structure: Structure) -> Interface:
-    """Return the parameters of a linkage and the expressions of its points.
-
-    Raises
-    ------
-    LinkageError, ParameterError
-        If a value is missing or of the wrong kind.
-    """
+    """Return the interface of a linkage; raise LinkageError or ParameterError if a value is missing or of the wrong kind."""
     drives = freedoms(description, structure)
     found: list[Parameter] = []
     points: dict[str, dict[str, tuple[str, str]]] = {GROUND: {}}

@@ -146,17 +146,7 @@ Step = FreedomStep | GearStep | RackStep | Dyad
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Order in which the poses of a linkage are computed.
-
-    Attributes
-    ----------
-    bodies : tuple of str
-        All moving bodies, including the massless pins of slots.
-    joints : mapping of str to Joint
-    freedoms : mapping of str to FreedomTable
-    steps : tuple of Step
-        In the order of the computation.
-    """
+    """Steps in the order in which the poses of a linkage are computed; ``bodies`` include the massless pins of slots."""
 
     bodies: tuple[str, ...]
     joints: Mapping[str, Joint]
@@ -172,10 +162,7 @@ class Structure:
 def joints(description: Description) -> dict[str, Joint]:
     """Return the joints of a description by name.
 
-    Raises
-    ------
-    LinkageError
-        If a joint names a body or point that does not exist, or a body is joined to nothing.
+    LinkageError is raised if a joint names a body or point that does not exist, or a body is joined to nothing.
     """
     owners: dict[str, list[str]] = {name: [GROUND] for name in description.ground}
     for name, body in description.bodies.items():
@@ -224,10 +211,7 @@ def joints(description: Description) -> dict[str, Joint]:
 def carrier_joints(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin, Slider, str]:
     """Return the pin of a gear, the slide of its rack, and the carrier: the body to which both are joined.
 
-    Raises
-    ------
-    LinkageError
-        If the gear is not pinned to the body on which its rack slides.
+    LinkageError is raised if the gear is not pinned to the body on which its rack slides.
     """
     for slide in found.values():
         if isinstance(slide, Slider) and rack.rack in slide.bodies:
@@ -302,11 +286,8 @@ def _check_pairs(found: Mapping[str, Joint]) -> None:
 def analyse(description: Description) -> Structure:
     """Find the order in which the poses of all bodies follow in closed form from the freedoms.
 
-    Raises
-    ------
-    LinkageError
-        If the number of freedoms is wrong, or the bodies are not a chain of dyads with these freedoms; the error names the
-        bodies whose poses do not follow, and other possible choices of freedoms.
+    LinkageError is raised if the number of freedoms is wrong, or the bodies are not a chain of dyads with these freedoms; the
+    error names the bodies whose poses do not follow, and other possible choices of freedoms.
     """
     if not description.bodies:
         raise LinkageError("linkage.bodies is empty: there must be at least one moving body")

@@ -16,30 +16,14 @@ Note = Callable[[str, str, str], None]
 
 @dataclass(slots=True, kw_only=True)
 class Finding:
-    """One fault of an FMU, with the calls that show the fault.
+    """One fault of an FMU, with the calls that show the fault; findings with the same key and severity are counted as one."""
 
-    Parameters
-    ----------
-    severity : str
-        One of `SEVERITIES`.
-    key : str
-        Interface, subject and kind of the finding; findings with the same key and severity are counted as one.
-    text : str
-        The finding as a sentence.
-    calls : list of str
-        The calls of the shortest case that shows the fault.
-    replay : str
-        Name of this case, for the option `--replay`.
-    count : int
-        Number of cases that show the fault.
-    """
-
-    severity: str
-    key: str
-    text: str
-    calls: list[str]
-    replay: str
-    count: int = 1
+    severity: str  # one of `SEVERITIES`
+    key: str  # interface, subject and kind of the finding
+    text: str  # the finding as a sentence
+    calls: list[str]  # of the shortest case that shows the fault
+    replay: str  # name of this case, for the option `--replay`
+    count: int = 1  # number of cases that show the fault
 
     @property
     def subject(self) -> str:

@@ -15,11 +15,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+_STATE = "GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState"
 #: Functions that are allowed in every state.
-_FMI2 = (
-    "SetDebugLogging Reset GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate"
-)
-_FMI3 = _FMI2.replace("FMUstate", "FMUState").replace("DeS", "Des")
+_FMI3 = f"SetDebugLogging Reset {_STATE}"
+_FMI2 = _FMI3.replace("FMUState", "FMUstate").replace("Deserialize", "DeSerialize")
 
 _FMI2_CS = """
                              instantiated ready initialization step failed terminated error

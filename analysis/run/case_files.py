@@ -158,13 +158,7 @@ def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
 
 
 def _tolerance(value: Any, name: str) -> float:
-    """Check a tolerance of the solver and return it.
-
-    Raises
-    ------
-    ParameterError
-        If the tolerance is outside its range; the message has its name in the file, ``name``.
-    """
+    """Return a tolerance of the solver; raise ParameterError with its name in the file if it is outside its range."""
     number = quantity(value, "1", name)
     low, high = TOLERANCE_RANGE
     if not low <= number <= high:

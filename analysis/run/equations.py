@@ -129,10 +129,7 @@ class TracedEquations(NamedTuple):
 def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations:
     """Return the equations as expressions in the channels and modes of a run, with the mechanism's switch on or off.
 
-    Raises
-    ------
-    LinkworkError
-        If the equations branch on a symbol, or call functions other than `symbolic.ELEMENTARY`.
+    LinkworkError is raised if the equations branch on a symbol, or call functions other than `symbolic.ELEMENTARY`.
     """
     casadi = symbolic.library()
     functions = symbolic_equations(mechanism)
@@ -193,12 +190,7 @@ def run_functions(mechanism: Mechanism, switched: bool = False) -> list[Any]:
 class Machine:
     """Machine code of a mechanism's equations.
 
-    Attributes
-    ----------
-    addresses : ndarray of int64
-        Addresses of the functions, with the indices DERIVATIVE to JUMP.
-    fingerprint : str
-        Hash of the code.
+    ``addresses`` are those of the functions, with the indices DERIVATIVE to JUMP; ``fingerprint`` is a hash of the code.
     """
 
     def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:

@@ -50,12 +50,8 @@ def unpacking_folder() -> str:
     """Return a folder in which to unpack any FMU: the temporary folder, or another one if PythonFMU cannot read its name.
 
     An FMU receives the URI of its folder. PythonFMU's library decodes only "%20" in the URI; if it then does not find its
-    files, it ends the process. Linkwork's own Python FMUs have a guard against this.
-
-    Raises
-    ------
-    CosimulationError
-        If there is no such folder.
+    files, it ends the process. Linkwork's own Python FMUs have a guard against this. CosimulationError is raised if there is no
+    such folder.
     """
     here = tempfile.gettempdir()
     others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
@@ -72,19 +68,9 @@ def unpacking_folder() -> str:
 class Experiment:
     """An experiment of an FMU; an attribute that the file does not give is None or empty.
 
-    Attributes
-    ----------
-    name, description : str
-    start, stop, step : float or None
-        Times (s).
-    tolerance : float or None
-        Relative tolerance of the solver.
-    allowed : float or None
-        Largest relative difference from the reference that the FMU allows.
-    parameters : mapping
-        Values of parameters by name, as texts.
-    stimuli, reference : structured ndarray or None
-        Inputs and reference results: a column of times (s), then a column for each variable by its name.
+    ``start``, ``stop`` and ``step`` are times (s), ``tolerance`` is the relative tolerance of the solver, and ``allowed`` the
+    largest relative difference from the reference that the FMU allows. ``parameters`` are values by name, as texts. ``stimuli``
+    and ``reference``, the reference results, have a column of times (s), then a column for each variable by its name.
     """
 
     name: str

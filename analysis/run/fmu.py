@@ -47,10 +47,7 @@ def _description(fmu: str | Path) -> Any:
 def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
     """Read the model description of an FMU with FMPy.
 
-    Raises
-    ------
-    InputError
-        If the description cannot be read, or a variable has no name.
+    InputError is raised if the description cannot be read, or a variable has no name.
     """
     try:
         with ZipFile(fmu) as archive:
@@ -71,10 +68,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
 def list_interfaces(fmu: str | Path) -> dict[str, str]:
     """Return the interfaces of an FMU: a description of each, by the name that `cosimulate` takes.
 
-    Raises
-    ------
-    CosimulationError
-        If the file is not an FMU.
+    CosimulationError is raised if the file is not an FMU.
     """
     description = _description(fmu)
     kinds: dict[str, type[_Instance]] = {"co-simulation": FmuRun, "model-exchange": FmuModel}
@@ -88,23 +82,9 @@ def list_interfaces(fmu: str | Path) -> dict[str, str]:
 class _Instance:
     """An initialised instance of an FMU of Linkwork, run by FMPy. Use it as a context manager.
 
-    The FMU must be of the mechanism to which the parameters belong; the file determines the version of FMI.
-
-    Parameters
-    ----------
-    fmu : path
-    parameters, initial
-        Parameters and initial state of a mechanism.
-    modes : dict
-        Values of the mechanism's modes, by name.
-    tolerance, start_time : float
-    inputs : dict
-        Inputs at the start, by name.
-
-    Raises
-    ------
-    CosimulationError
-        If the file is not such an FMU, or its initialisation fails.
+    The FMU must be of the mechanism to which the parameters belong; the file determines the version of FMI. ``modes`` are the
+    values of the mechanism's modes, ``inputs`` those of the inputs at the start, both by name. CosimulationError is raised if
+    the file is not such an FMU, or its initialisation fails.
     """
 
     interface: ClassVar[str]
@@ -264,12 +244,9 @@ class FmuRun(_Instance):
 
 
 class FmuModel(_Instance):
-    """An instance of an FMU for model exchange, in continuous-time mode: states, derivatives, events.
+    """An instance of an FMU for model exchange, in continuous-time mode.
 
-    Attributes
-    ----------
-    states, indicators : int
-        Number of continuous states, and number of event indicators.
+    ``states`` and ``indicators`` are the numbers of continuous states and of event indicators.
     """
 
     interface = "model exchange"

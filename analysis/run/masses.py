@@ -20,18 +20,10 @@ from .arguments import takes_published
 
 
 class Mass(NamedTuple):
-    """A mass of a case, and where it comes from.
+    """A mass of a case (kg) by the name of its FMI parameter, and where the value comes from, such as ``"of table-3.1"``.
 
-    Attributes
-    ----------
-    name : str
-        Name of the FMI parameter.
-    value : float
-        Mass (kg).
-    origin : str
-        Where the value comes from, such as ``"of table-3.1"``.
-    stale : str
-        Text that names the values kept from the published set although the link has another length than in the set; else empty.
+    ``stale`` names the values kept from the published set although the link has another length than in the set; else it is
+    empty.
     """
 
     name: str
@@ -104,11 +96,7 @@ def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parame
     """Return the values of a file, by dotted name, with sections of links replaced by masses, centres and inertias.
 
     A mass given in addition to a section is taken as weighed: centre and radius of gyration are still those of the section.
-
-    Raises
-    ------
-    ParameterError
-        If a section is wrong, or a centre or an inertia is given in addition to a section.
+    ParameterError is raised if a section is wrong, or a centre or an inertia is given in addition to a section.
     """
     result = dict(flat)
     units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
@@ -138,15 +126,8 @@ def mass_origins(
 ) -> tuple[Mass, ...]:
     """Return the masses of a case, each with the origin of its value.
 
-    Parameters
-    ----------
-    parameters : parameters of a mechanism
-    flat : mapping
-        Values that the case gives, by dotted name, before `resolve_sections`.
-    known : PublishedSet, optional
-        Published set from which the case takes its other values.
-    source : str
-        Name of this set.
+    ``flat`` has the values that the case gives, by dotted name, before `resolve_sections`. The case takes its other values from
+    the published set ``known``, whose name is ``source``.
     """
     mechanism = find_mechanism(parameters)
     links = {link.mass: link for link in mechanism.links}
@@ -182,11 +163,6 @@ def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
 
     Values equal to those in the most similar published set are attributed to this set; all others count as given. If only
     zeros are equal, all masses count as given.
-
-    Raises
-    ------
-    InputError
-        If the parameters are not those of a mechanism.
     """
     mechanism = find_mechanism(parameters)
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}

@@ -60,13 +60,7 @@ class _Export:
 
 
 def do(kind: str, request: Mapping[str, Any]) -> Answer:
-    """Run a job of `JOBS` with the entries ``state`` and ``wanted`` (options) of a request, and return its answer.
-
-    Raises
-    ------
-    LinkworkError
-        Any error of the job.
-    """
+    """Run a job of `JOBS` with the entries ``state`` and ``wanted`` (options) of a request, and return its answer."""
     wanted, work = JOBS[kind]
     state = request.get("state")
     if not isinstance(state, Mapping):

@@ -39,21 +39,11 @@ def _flat_table(value: Any, name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTable:
-    """Table of a part of a system: a case, a partner, a controller or an FMU, and start values.
+    """Table of a part of a system: a case, one of `PARTNERS`, one of `CONTROLLERS` or an FMU, and start values.
 
-    Attributes
-    ----------
-    case : str
-        A published set, or a case file or linkage file: it gives the parameters and the initial state.
-    partner : str
-        One of `PARTNERS`.
-    controller : str
-        One of `CONTROLLERS`.
-    fmu : str
-        An FMU of FMI 2.0 or 3.0, from any tool.
-    values : mapping
-        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list with the name ``table``
-        sets ``table_0``, ``table_1`` and so on.
+    A case is a published set, or a case file or linkage file: it gives the parameters and the initial state. An FMU is of FMI
+    2.0 or 3.0, from any tool. ``values`` are start values of parameters and inputs, by FMI name: texts with units, or numbers
+    in SI. A list with the name ``table`` sets ``table_0``, ``table_1`` and so on.
     """
 
     case: str = entry(files.text, "")
@@ -92,15 +82,7 @@ def _connections(value: Any, name: str) -> dict[End, End]:
 class System:
     """A system of connected parts, as a file describes it.
 
-    Attributes
-    ----------
-    title : str
-    parts : mapping of str to PartTable
-    connections : mapping of End to End
-        For each connected input, the output to which it is connected.
-    run : RunTable
-    folder : path
-        Folder to which file names are relative.
+    ``connections`` has for each connected input the output to which it is connected; file names are relative to ``folder``.
     """
 
     title: str = entry(files.text, "")
@@ -189,17 +171,8 @@ class System:
     def wiring(self, *, fmi: int = 2) -> Wiring:
         """Build the FMUs of the system in the user's cache, and return the wiring.
 
-        Parameters
-        ----------
-        fmi : int
-            Version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0.
-
-        Raises
-        ------
-        BuildError
-            If an FMU cannot be built.
-        WiringError, UnknownNameError
-            If a connection is not valid.
+        ``fmi`` is the version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0. BuildError is
+        raised if an FMU cannot be built, WiringError or UnknownNameError if a connection is not valid.
         """
         place = code_folder("systems")
         parts = {name: Part.from_fmu(name, m.build(place, fmi), m.values) for name, m in self.members.items()}
@@ -277,13 +250,7 @@ def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str
 
 
 def load_system(path: str | Path) -> System:
-    """Read a system from a TOML file.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If the file cannot be read, or an entry is wrong.
-    """
+    """Read a system from a TOML file; raise InputError or ParameterError if it cannot be read, or an entry is wrong."""
     return replace(files.read(System, files.read_tables(path), ""), folder=Path(path).parent)
 
 

@@ -67,21 +67,10 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """An FMU of a system.
+    """An FMU of a system, for co-simulation of FMI 2.0 or 3.0: all its variables, and its model description as read by FMPy.
 
-    Attributes
-    ----------
-    name : str
-    fmu : path
-        An FMU for co-simulation, FMI 2.0 or 3.0.
-    ports : mapping of str to Port
-        All variables of the FMU.
-    values : mapping of str to float
-        Start values by variable; all other variables have the start values of the FMU.
-    feeds : mapping of str to tuple of str
-        Inputs on which an output depends directly, by the name of the output.
-    description : object
-        Model description as read by FMPy.
+    ``values`` are start values; all other variables have the start values of the FMU. ``feeds`` has the inputs on which an
+    output depends directly, by the name of the output.
     """
 
     name: str
@@ -93,15 +82,10 @@ class Part:
 
     @classmethod
     def from_fmu(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
-        """Read a part from its FMU.
+        """Read a part from its FMU; raise InputError if the file is none.
 
-        Raises
-        ------
-        InputError
-            If the file is no FMU.
-        WiringError
-            If the FMU is not for co-simulation with FMI 2.0 or 3.0, a name in ``values`` is no parameter or input of it, or a
-            value is not of the type of its variable.
+        WiringError is raised if the FMU is not for co-simulation with FMI 2.0 or 3.0, a name in ``values`` is no parameter or
+        input of it, or a value is not of the type of its variable.
         """
         check_fmu(fmu)
         description = read_description(fmu)
@@ -186,23 +170,10 @@ _POWERS = (("N.m", "rad/s"), ("N", "m/s"))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
-    """The parts of a system and their connections.
+    """The parts of a system and their connections; WiringError or UnknownNameError is raised if a connection is wrong.
 
-    Attributes
-    ----------
-    title : str
-    parts : mapping of str to Part
-    connections : mapping of End to End
-        For each connected input, the output to which it is connected.
-    stop_time, step : float
-        End of a run, and default communication step (s).
-    remarks : tuple of str
-        Sentences on entries of the system's file that have no effect.
-
-    Raises
-    ------
-    WiringError, UnknownNameError
-        If a connection is wrong.
+    ``connections`` has for each connected input the output to which it is connected. The end of a run and the default
+    communication step are in s; ``remarks`` are sentences on entries of the system's file that have no effect.
     """
 
     title: str
