@@ -102,13 +102,9 @@ class Contest:
 
 
 class Trace:
-    """The best error of a search as a function of its processor time; the clock is stopped while a linkage is measured.
+    """The best error of a search as a function of its processor time; the search ends after the time ``budget`` (s).
 
-    Parameters
-    ----------
-    contest : Contest
-    budget : float
-        Time after which the search ends (s).
+    The clock is stopped while a linkage is measured.
     """
 
     def __init__(self, contest: Contest, budget: float) -> None:
@@ -122,13 +118,7 @@ class Trace:
         return self.points[-1][1] if self.points else inf
 
     def tick(self) -> float:
-        """Return the time that the search has taken so far (s).
-
-        Raises
-        ------
-        TimeUp
-            If the time of the search is over.
-        """
+        """Return the time that the search has taken so far (s); raise TimeUp if its time is over."""
         seconds = process_time() - self._begun - self._measuring
         if seconds > self.budget:
             raise TimeUp
@@ -214,16 +204,9 @@ class PlacedFourBar:
     pylinkage's optimisers accept any object that has the methods of its linkages. They call `set_constraints` with values in
     the form that `get_constraints` returns.
 
-    Parameters
-    ----------
-    fixed : ndarray, shape (11,)
-        Values of `constraints.UNKNOWNS`; `set_constraints` sets the free ones.
-    free : ndarray of int
-        Indices of the free unknowns.
-    branch : int
-        Assembly; pylinkage itself continues from the position of C.
-    n : int
-        Steps in a turn.
+    ``fixed``, shape (11,), are the values of `constraints.UNKNOWNS`, of which `set_constraints` sets those with the indices
+    ``free``. ``branch`` is the assembly (pylinkage itself continues from the position of C), and ``n`` the number of steps in a
+    turn.
     """
 
     def __init__(self, fixed: FloatArray, free: NDArray[np.intp], branch: int, n: int) -> None:

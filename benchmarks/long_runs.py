@@ -61,10 +61,7 @@ ACTING: Mapping[str, Callable[[float], Inputs]] = {
 def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any) -> tuple[float, float]:
     """Run a mechanism for a number of turns at its initial speed, from a crank angle of ``begun`` turns.
 
-    Returns
-    -------
-    residual, angle : float
-        Largest relative residual of the energy, and angle by which the crank has turned (rad).
+    Return the largest relative residual of the energy, and the angle by which the crank has turned (rad).
     """
     parameters, start, speed = FREE[mechanism]
     start = replace(start, crank_angle=2.0 * pi * begun)
@@ -79,12 +76,8 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
 def compare_late_run(what: str, **options: Any) -> tuple[float, float]:
     """Compare a run of half a second that begins at the time `LATE` (s) with a run that begins at zero.
 
-    ``what`` is the name of the inputs of both runs in `ACTING`.
-
-    Returns
-    -------
-    difference, steps : float
-        Largest difference of the slider position relative to its largest magnitude, and ratio of the numbers of steps.
+    ``what`` is the name of the inputs of both runs in `ACTING`. Return the largest difference of the slider position relative
+    to its largest magnitude, and the ratio of the numbers of steps.
     """
     # sample times that are exact floats in both runs
     samples = np.arange(513) * 2.0**-10
@@ -115,10 +108,7 @@ def compare_late_fmu(
 ) -> tuple[float, float]:
     """Compare 512 steps of a built FMU from the time `LATE` (s) with 512 steps from zero.
 
-    Returns
-    -------
-    angle, position : float
-        Largest differences of the crank's angle (rad) and of the slider's position (m).
+    Return the largest differences of the crank's angle (rad) and of the slider's position (m).
     """
     parameters, start, _ = FREE[mechanism]
     options = {"initial": start, "step": step, "interface": interface}

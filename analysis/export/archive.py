@@ -72,11 +72,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
 
 
 def common_files(
-    mechanism: Mechanism,
-    variables: Sequence[Variable],
-    made: str,
-    notes: Sequence[str],
-    icon: str = "model.png",
+    mechanism: Mechanism, variables: Sequence[Variable], made: str, notes: Sequence[str], icon: str = "model.png"
 ) -> dict[str, bytes]:
     """Return experiments, icon, licence and the HTML page of an FMU by path in the archive.
 

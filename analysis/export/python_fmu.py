@@ -44,20 +44,9 @@ _NEEDS_PYTHON = (
 def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str = SOURCES) -> Path:
     """Build the Python FMU of a mechanism and return its path.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    dest : path
-        Folder for the FMU; made if it is not there.
-    sources : path
-        Source root that contains ``linkwork`` and the slave.
-
-    Raises
-    ------
-    BuildError
-        If the sources are incomplete, or the FMU is not valid.
-    MechanismError
-        If the parts of the mechanism do not fit together.
+    The folder ``dest`` is made if it is not there; ``sources`` is the source root that contains ``linkwork`` and the slave.
+    BuildError is raised if the sources are incomplete, or the FMU is not valid, MechanismError if the parts of the mechanism do
+    not fit together.
     """
     check(mechanism)
     name = mechanism.fmu

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from itertools import chain
 
 from linkwork.errors import ParameterError
@@ -24,18 +24,8 @@ def check_entries(description: Description) -> None:
     for name, body in d.bodies.items():
         for own in body.all_points:
             owners.setdefault(own, set()).add(name)
-    found = chain(
-        _names(d, owners),
-        _bodies(d),
-        _bodies_without_length(d, owners),
-        _gears(d, owners),
-        _slots(d, owners),
-        _springs(d, owners),
-        _freedoms(d, owners),
-    )
-    for where, wrong, right in chain(
-        found, _find_duplicates("loads", [load.point for load in d.loads]), _find_duplicates("torques", d.torques)
-    ):
+    checks = (_names, _bodies, _bodies_without_length, _gears, _slots, _springs, _freedoms, _duplicates)
+    for where, wrong, right in chain.from_iterable(check(d, owners) for check in checks):
         raise LinkageError(f"linkage.{where} {wrong}: {right}")
 
 
@@ -43,11 +33,11 @@ def check_entries(description: Description) -> None:
 Found = Iterator[tuple[str, str, str]]
 
 
-def _find_duplicates(where: str, names: Iterable[str]) -> Found:
-    names = list(names)
-    for name in names:
-        if names.count(name) > 1:
-            yield where, f"has {name} twice", "once is enough"
+def _duplicates(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for where, names in (("loads", [load.point for load in d.loads]), ("torques", d.torques)):
+        for name in names:
+            if names.count(name) > 1:
+                yield where, f"has {name} twice", "once is enough"
 
 
 #: Tables of variables that every linkage has.
@@ -80,7 +70,7 @@ def _bodies_without_length(d: Description, owners: Mapping[str, set[str]]) -> Fo
             yield f"bodies.{name}.points.{other}", f"is where {one} is", "the body must have a length between its pins"
 
 
-def _bodies(d: Description) -> Found:
+def _bodies(d: Description, owners: Mapping[str, set[str]]) -> Found:
     if not d.ground:
         yield "ground", "has no points", "at least one body must be pinned to it or slide on it"
     for name, body in d.bodies.items():

@@ -24,39 +24,24 @@ _POSITIONS = 360
 class Reach(NamedTuple):
     """Range of a freedom about its start in which the linkage can be assembled, with the other freedoms at their start.
 
-    Attributes
-    ----------
-    freedom : int
-        Index of the degree of freedom.
-    unit : str
-        Unit of the freedom's coordinate, rad or m.
-    low, high : float
-        Ends of the range (rad, m): limits of assembly, or the ends of a turn or of the search.
-    open : (bool, bool)
-        For the low and the high end: whether the linkage can move beyond this end.
-    turns : bool
-        Whether the freedom can make a whole turn.
-    least : float
-        Least clearance of any dyad in the range; the clearance of a dyad is the sine of its transmission angle.
+    The ends ``low`` and ``high`` are limits of assembly, or the ends of a turn or of the search; ``open`` says for each of them
+    whether the linkage can move beyond it. The clearance of a dyad is the sine of its transmission angle.
     """
 
-    freedom: int
-    unit: str
+    freedom: int  # index of the degree of freedom
+    unit: str  # of its coordinate, rad or m
     low: float
     high: float
     open: tuple[bool, bool]
-    turns: bool
-    least: float
+    turns: bool  # whether the freedom can make a whole turn
+    least: float  # least clearance of any dyad in the range
 
 
 def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None) -> Reach:
-    """Find the range in which the coordinate of a degree of freedom can move.
+    """Find the range in which the coordinate of a degree of freedom, given by its index, can move.
 
     Parameters
     ----------
-    mechanism : Mechanism
-    freedom : int
-        Index of the degree of freedom.
     most : float, optional
         Greatest distance from the start that is searched, in both directions. If an angle has a limit in one direction only,
         the other is searched twice as far. By default half the period of the coordinate; if it is not periodic, four turns
@@ -124,18 +109,10 @@ def _seek_limit(margin: Callable[[float], float], middle: float, most: float, sa
 
 
 class DeadCentre(NamedTuple):
-    """A position at which a driven body stands still while the freedom moves on.
+    """A position at which a driven body stands still while the freedom moves on."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the body if it is pinned to the ground, or of its slide if it slides on the ground.
-    at : float
-        Coordinate of the freedom (rad, m).
-    """
-
-    name: str
-    at: float
+    name: str  # of the body if it is pinned to the ground, or of its slide if it slides on the ground
+    at: float  # coordinate of the freedom (rad, m)
 
 
 def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list[DeadCentre]:

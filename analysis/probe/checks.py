@@ -42,9 +42,7 @@ def _can_save(model: Model) -> bool:
 #: The checks by name, in the order in which they are made.
 CHECKS = {
     "starts": Check(
-        "parameters and inputs have their declared starts after the initialization",
-        check_starts,
-        lambda model: 1,
+        "parameters and inputs have their declared starts after the initialization", check_starts, lambda model: 1
     ),
     "repeat": Check(
         "the same calls give the same bits: in a new instance, after a reset, beside another instance",
@@ -57,9 +55,7 @@ CHECKS = {
         lambda model: 3 if model.can_save else 0,
     ),
     "serialize": Check(
-        "a state is serialized to the same bytes each time",
-        check_serializing,
-        lambda model: 2 * _can_save(model),
+        "a state is serialized to the same bytes each time", check_serializing, lambda model: 2 * _can_save(model)
     ),
     "deserialize": Check(
         "a run continued from those bytes in another process gives the same bits",
@@ -67,19 +63,13 @@ CHECKS = {
         lambda model: 2 * _can_save(model),
     ),
     "split": Check(
-        "one step and two halves: the largest difference",
-        compare_half_steps,
-        lambda model: model.interface == "cs",
+        "one step and two halves: the largest difference", compare_half_steps, lambda model: model.interface == "cs"
     ),
     "derivatives": Check(
-        "directional and adjoint derivatives against differences",
-        check_derivatives,
-        _count_derivative_cases,
+        "directional and adjoint derivatives against differences", check_derivatives, _count_derivative_cases
     ),
     "bounds": Check(
-        "over a run with random inputs every variable keeps to its declared range",
-        check_bounds,
-        lambda model: 2,
+        "over a run with random inputs every variable keeps to its declared range", check_bounds, lambda model: 2
     ),
     "parameters": Check(
         "a parameter beyond its declared range is refused",

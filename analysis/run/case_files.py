@@ -89,15 +89,7 @@ def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "")
 
 
 def load_parameters(path: str | Path) -> Parameters:
-    """Read parameters from a TOML or JSON file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    ParameterError
-        As for `read_parameters`.
-    """
+    """Read parameters from a TOML or JSON file as `read_parameters` does; raise InputError if the file cannot be read."""
     return read_parameters(files.read_tables(path))
 
 
@@ -168,18 +160,10 @@ def _tolerance(value: Any, name: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
-    """The table ``[run]``: duration, step and tolerance of a run.
+    """The table ``[run]``: duration (s), or else number of revolutions of the slowest crank, step (s) and tolerance of a run.
 
-    Attributes
-    ----------
-    stop_time : float, optional
-        Duration of the run. By default three revolutions of the slowest crank, if its speed is constant.
-    revolutions : float, optional
-        Duration in revolutions of the slowest crank, if its speed is constant. Not with stop_time.
-    step : float, optional
-        Time between two samples. By default the time of 1 deg of the fastest crank; 1 ms if no crank has a constant speed.
-    tolerance : float
-        Tolerance of the solver, between 1e-13 and 0.01.
+    Revolutions need a crank with a constant speed. If there is one, the run by default lasts three revolutions of the slowest
+    crank, in steps of one degree of the fastest crank; otherwise the default step is 1 ms.
     """
 
     stop_time: float | None = entry(Quantity("s"), None)
@@ -188,11 +172,7 @@ class RunTable:
     tolerance: float = entry(_tolerance, 1e-9)
 
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
-        """Return the stop time and the sampling step (s).
-
-        If cranks are driven at constant speeds, the run by default lasts three revolutions of the slowest crank, in steps of
-        one degree of the fastest crank.
-        """
+        """Return the stop time and the sampling step (s)."""
         turn = turn_durations(inputs, mechanism)
         step = self.step if self.step is not None else 1e-3 if turn is None else turn[1] / 360.0
         if self.stop_time is not None:
@@ -464,19 +444,9 @@ def _make_table(
 class Case:
     """A case: all data that a run needs, in process or through the FMU, in SI units.
 
-    Attributes
-    ----------
-    title : str
-    parameters, initial, inputs
-        Parameters, initial state and inputs of one mechanism; by default the mechanism is at rest and nothing acts on it.
-    stop_time : float
-        End of the run (s), which starts at 0.
-    step : float
-        Time between samples, and communication step of the FMU (s).
-    tolerance : float
-        Tolerance of the integrator, as for `simulate`.
-    masses : tuple of Mass
-        The masses, each with the origin of its value; empty if the origins are not known.
+    By default the mechanism is at rest and nothing acts on it. The run starts at 0; ``step`` is the time between samples, and
+    the communication step of the FMU (s). ``tolerance`` is as for `simulate`, and ``masses`` are empty if their origins are not
+    known.
     """
 
     title: str
@@ -499,11 +469,7 @@ def published_case(name: str) -> Case:
 
     The run lasts three revolutions of the slowest crank, in steps of one degree of the fastest crank. If no speed
     is commanded, duration and step are those of the default experiment of the FMU.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no set of that name.
+    UnknownNameError is raised if there is no set of that name.
     """
     entry = published_set(name)
     mechanism, inputs = find_mechanism(entry.parameters), complete_inputs(entry, None)

@@ -401,10 +401,7 @@ def channels_of_many(t, source, batch, x, u):
         write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])
 
 
-@kernel(
-    types.void(PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
-    purpose="the solver",
-)
+@kernel(types.void(PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64), purpose="the solver")
 def run(problem, source, batch, watch, state, samples, status, most, budget):
     """Integrate the runs of a batch whose status is RUNNING, one after the other.
 

@@ -117,12 +117,7 @@ class Outcome:
 def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
     """Read the experiments that an FMU contains.
 
-    Raises
-    ------
-    InputError
-        If the file is not an FMU.
-    ExperimentError
-        If the FMU has no experiments, or they cannot be read.
+    InputError is raised if the file is not an FMU, ExperimentError if the FMU has no experiments, or they cannot be read.
     """
     check_fmu(fmu)
     with ZipFile(fmu) as archive:
