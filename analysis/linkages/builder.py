@@ -21,10 +21,7 @@ LINKAGE = "linkage"
 
 
 def read_description(tables: Mapping[str, Any]) -> Description:
-    """Read a description from the content of the table ``[linkage]`` of a file.
-
-    ParameterError is raised if an entry is unknown, missing or wrong; the message gives its place in the file.
-    """
+    """Read the table ``[linkage]`` of a file; raise ParameterError with its place if an entry is unknown, missing or wrong."""
     return files.read(Description, tables, LINKAGE)
 
 

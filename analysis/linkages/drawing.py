@@ -78,10 +78,7 @@ class Picture:
         return joints, parts
 
     def tick(self, pair: str, gear: str, pin: str, arm: str) -> PicturePoint:
-        """Return a mark on the pitch circle of a gear.
-
-        ``arm`` is the expression of the vector from the gear's ``pin`` to the mark.
-        """
+        """Return a mark on the pitch circle of a gear; ``arm`` is the expression of the vector from the ``pin`` to the mark."""
         return PicturePoint(
             f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)"
         )
@@ -126,10 +123,7 @@ class Picture:
         return f"({''.join(f'{quote(name)}, ' for name in moves[:2])})"
 
     def paths(self) -> list[str]:
-        """Return the points whose paths are drawn: all points of moving bodies that are not joints.
-
-        If there are none, return the last pin between moving bodies.
-        """
+        """Return the points whose paths are drawn: those of moving bodies that are no joints, or else the last moving pin."""
         moving = [own for body in self.description.bodies for own in self.interface.points[body]]
         alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
         return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

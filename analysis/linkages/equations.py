@@ -16,10 +16,7 @@ from .writing import function, record
 
 
 class PoseWriter:
-    """Writer of the function that computes the poses of all bodies of one linkage.
-
-    Its methods write lines of that function, or return expressions for them.
-    """
+    """Writer of the function that computes the poses of all bodies of one linkage."""
 
     def __init__(self, interface: Interface) -> None:
         self.structure, self.interface = interface.structure, interface
@@ -159,10 +156,7 @@ class PoseWriter:
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def derivative_tuple(self, terms: dict[int, str]) -> str:
-        """Return the source of the tuple of derivatives with respect to the coordinates.
-
-        ``terms`` has the derivatives that are not zero, by index of the coordinate.
-        """
+        """Return the source of the tuple of derivatives by the coordinates; ``terms`` has those that are not zero, by index."""
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
     def linear_turn(self, terms: dict[int, str], constants: Iterable[str]) -> str:

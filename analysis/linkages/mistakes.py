@@ -13,10 +13,7 @@ from .laws import check_law
 
 
 def check_entries(description: Description) -> None:
-    """Check that the entries of a description fit together; raise LinkageError or ParameterError if one does not fit.
-
-    The message says where it is in the file, and what would be right.
-    """
+    """Raise LinkageError or ParameterError, with the place in the file, for the first entry that does not fit the others."""
     d = description
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):
         raise ParameterError("linkage.name", d.name, "have letters, digits and hyphens, and begin with a letter")

@@ -403,10 +403,7 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def spring_angle_name(description: Description, name: str) -> str:
-    """Return the name of the angle of a torsion spring, such as ``A.turn``.
-
-    It begins with the name of the pin, or with that of the spring if the spring has no pin or the pin has several springs.
-    """
+    """Return the name of the angle of a torsion spring: ``A.turn`` at a pin A with one spring, else with the spring's name."""
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
     return f"{pin if pin and alone else name}.turn"

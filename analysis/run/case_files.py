@@ -278,10 +278,7 @@ def _case_file_name(name: str, mechanism: Mechanism) -> str:
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput]
 ) -> dict[str, Any]:
-    """Return the tables of a case without the entries that an override replaces.
-
-    These entries are drives of the same degree of freedom, or entries that set the end of the run.
-    """
+    """Return the tables of a case without the rival drives, or ends of the run, that an override replaces."""
     result = dict(data)
     for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
         if given in overrides and isinstance(run := result.get("run"), Mapping):

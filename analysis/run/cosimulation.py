@@ -185,10 +185,7 @@ class _Stepwise:
         return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
-        """Return the slopes of the inputs over the next step.
-
-        The outputs ``row`` at the beginning of the step are used to predict the state at its end.
-        """
+        """Return the slopes of the inputs over the next step; the state at its end is predicted from the outputs ``row``."""
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
         n, laws = len(self.rates), self.laws.copy()

@@ -45,10 +45,7 @@ def _description(fmu: str | Path) -> Any:
 
 
 def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
-    """Read the model description of an FMU with FMPy.
-
-    InputError is raised if the description cannot be read, or a variable has no name.
-    """
+    """Read the model description of an FMU with FMPy; raise InputError if it cannot be read, or a variable has no name."""
     try:
         with ZipFile(fmu) as archive:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
@@ -66,10 +63,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
 
 
 def list_interfaces(fmu: str | Path) -> dict[str, str]:
-    """Return the interfaces of an FMU: a description of each, by the name that `cosimulate` takes.
-
-    CosimulationError is raised if the file is not an FMU.
-    """
+    """Return a description of each interface of an FMU by its name in `cosimulate`; raise CosimulationError for other files."""
     description = _description(fmu)
     kinds: dict[str, type[_Instance]] = {"co-simulation": FmuRun, "model-exchange": FmuModel}
     return {

@@ -50,10 +50,7 @@ class Worker:
         self._number = 0
 
     def start(self) -> None:
-        """Start the process if there is none, so that the next job does not wait for its imports.
-
-        LinkworkError is raised if the system cannot start a process.
-        """
+        """Start the process, which then imports all that a job needs; raise LinkworkError if the system cannot."""
         with self._lock:
             if self._process is not None and self._process.is_alive():
                 return
