@@ -243,18 +243,10 @@ def measure_master(master: str, folder: Path) -> Table:
         for kind in row.kinds
         if row.master == master and (rated or not row.sets_rate)
     ]
-    cases = [
-        [
-            str(built_fmu(MECHANISMS[c.mechanism], kind, folder)),
-            [*c],
-            rated,
-            h,
-            round(COUNT * STEPS[0] / h),
-            *row.arguments,
-        ]
-        for row, c, rated, kind in looked
-        for h in STEPS
-    ]
+    cases: list[list[Any]] = []
+    for row, command, rated, kind in looked:
+        fmu = str(built_fmu(MECHANISMS[command.mechanism], kind, folder))
+        cases += [[fmu, [*command], rated, h, round(COUNT * STEPS[0] / h), *row.arguments] for h in STEPS]
     by = looked[0][0].by
     stepwise = by.__module__ == masters.__name__
     ends = by_steps(by, cases) if stepwise else run_in_process(by, cases, options=(), timeout=3000.0)

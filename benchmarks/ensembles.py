@@ -123,18 +123,9 @@ def main() -> None:
         return
     stiffness, some = 500.0 + 1000.0 * np.arange(n) / n, range(0, n, max(1, n // FEW))
     drives = {"speed": 0.5 * SPEED * (1.0 + np.arange(n) / n), "torque": 10.0 * np.arange(n) / n}
-    columns = (
-        "alone",
-        "one by one",
-        "in lanes",
-        "compiled part",
-        "alone",
-        "one by one",
-        "compiled parts",
-        "CPU",
-        "clock",
-    )
-    table = Table(f"{n} runs", *columns, title="microseconds a run; ratios to lanes; two threads")
+    times, ratios = ("alone", "one by one", "in lanes", "compiled part"), ("alone", "one by one", "compiled parts")
+    title = "microseconds a run; ratios to lanes; two threads"
+    table = Table(f"{n} runs", *times, *ratios, "CPU", "clock", title=title)
     for length, stop_time in LENGTHS.items():
         for drive, values in drives.items():
             samples = {"stop_time": stop_time, "step": 1e-3}

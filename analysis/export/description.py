@@ -74,39 +74,21 @@ _NATIVE_3 = {"needsExecutionTool": "false", "canBeInstantiatedOnlyOncePerProcess
     "canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives"
 )
 
-PYTHON = Kind(
-    2,
-    "",
-    f"PythonFMU {version('pythonfmu')}",
-    {
-        "CoSimulation": _STEPS
-        | {"canInterpolateInputs": "false"}
-        | _STATE_2
-        | _true("canNotUseMemoryManagementFunctions")
-    },
-)
-NATIVE = Kind(
-    2,
-    "_native",
-    f"Linkwork {linkwork.__version__}",
-    {
-        "ModelExchange": _NATIVE_2 | _true("completedIntegratorStepNotNeeded"),
-        "CoSimulation": _NATIVE_2 | _STEPS | _true("canInterpolateInputs") | {"maxOutputDerivativeOrder": "1"},
-    },
-)
-NATIVE_FMI3 = Kind(
-    3,
-    "_native_fmi3",
-    f"Linkwork {linkwork.__version__}",
-    {
-        "ModelExchange": _NATIVE_3
-        | {"needsCompletedIntegratorStep": "false", "providesEvaluateDiscreteStates": "false"},
-        "CoSimulation": _NATIVE_3
-        | _STEPS
-        | _true("providesIntermediateUpdate", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate")
-        | {"maxOutputDerivativeOrder": "1", "hasEventMode": "false", "providesEvaluateDiscreteStates": "false"},
-    },
-)
+_EARLY_3 = _true("providesIntermediateUpdate", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate")
+_SLOPES, _NO_DISCRETE_3 = {"maxOutputDerivativeOrder": "1"}, {"providesEvaluateDiscreteStates": "false"}
+
+_PYTHON = _STEPS | {"canInterpolateInputs": "false"} | _STATE_2 | _true("canNotUseMemoryManagementFunctions")
+_FMI2 = {
+    "ModelExchange": _NATIVE_2 | _true("completedIntegratorStepNotNeeded"),
+    "CoSimulation": _NATIVE_2 | _STEPS | _true("canInterpolateInputs") | _SLOPES,
+}
+_FMI3 = {
+    "ModelExchange": _NATIVE_3 | {"needsCompletedIntegratorStep": "false"} | _NO_DISCRETE_3,
+    "CoSimulation": _NATIVE_3 | _STEPS | _EARLY_3 | _SLOPES | {"hasEventMode": "false"} | _NO_DISCRETE_3,
+}
+PYTHON = Kind(2, "", f"PythonFMU {version('pythonfmu')}", {"CoSimulation": _PYTHON})
+NATIVE = Kind(2, "_native", f"Linkwork {linkwork.__version__}", _FMI2)
+NATIVE_FMI3 = Kind(3, "_native_fmi3", f"Linkwork {linkwork.__version__}", _FMI3)
 KINDS = {"python": PYTHON, "native": NATIVE, "native-fmi3": NATIVE_FMI3}
 
 

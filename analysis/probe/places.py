@@ -13,20 +13,8 @@ from .model import Model
 from .session import Library, ProbeError, Session
 
 FOLDERS = (
-    "with space",
-    "Müller",
-    "日本",
-    "(a)",
-    "a#b",
-    "100%",
-    "a%20b",
-    "a+b",
-    "a&b",
-    "a@b",
-    "it's",
-    "a,b;c=d",
-    "[x]",
-    "~tilde",
+    *("with space", "Müller", "日本", "(a)", "a#b", "100%", "a%20b"),
+    *("a+b", "a&b", "a@b", "it's", "a,b;c=d", "[x]", "~tilde"),
 )
 
 #: Unusual forms of the resource location: name, severity of the finding if the FMU refuses, and a function that makes the text

@@ -93,15 +93,8 @@ class Session:
         path = f"{self.folder / 'resources'}/".encode()
         if model.interface == "me":
             return "InstantiateModelExchange", [b"probe", token, path, False, True, None, self.library.callbacks]
-        more = [
-            self.event_mode,
-            early_return,
-            None,
-            0,
-            None,
-            self.library.callbacks,
-            fmi3.fmi3IntermediateUpdateCallback(),
-        ]
+        update = fmi3.fmi3IntermediateUpdateCallback()
+        more = [self.event_mode, early_return, None, 0, None, self.library.callbacks, update]
         return "InstantiateCoSimulation", [b"probe", token, path, False, True, *more]
 
     def instantiate(self, arguments: Iterable[Any] | None = None, **options: bool) -> bool:

@@ -382,21 +382,15 @@ def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
     The values of a signal have the unit ``unit``; the file of a table is read from ``folder``.
     """
     value, values = Quantity(unit), Many(Quantity(unit))
+    waves: dict[str, Reader] = {"mean": value, "amplitudes": values}
+    waves |= {"frequencies": Many(Quantity("rad/s")), "phases": Many(Quantity("rad"))}
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),
         "table": Table(
             partial(_make_table, folder, unit),
             {"times": Many(Quantity("s")), "values": values, "file": files.text, "interpolation": Choice(SHAPES)},
         ),
-        "harmonics": Table(
-            _harmonics,
-            {
-                "mean": value,
-                "amplitudes": values,
-                "frequencies": Many(Quantity("rad/s")),
-                "phases": Many(Quantity("rad")),
-            },
-        ),
+        "harmonics": Table(_harmonics, waves),
     }
     if unit == "N.m":
         kinds["torsion-bar"] = Table(TorsionBar, {"torque": value, "release_angle": Quantity("rad")})

@@ -377,16 +377,8 @@ def output_scales(largest: Mapping[str, float], units: Mapping[str, str]) -> dic
         return max((size for n, size in largest.items() if units[n] == unit and n not in residuals), default=0.0)
 
     lengths, speed = like("m"), next((size for n, size in largest.items() if units[n] == "rad/s"), 0.0)
-    floors = {
-        "m": lengths,
-        "m/s": lengths * speed,
-        "m/s2": lengths * speed**2,
-        "rad/s": speed,
-        "rad/s2": speed**2,
-        "N": like("N"),
-        "N.m": like("N") * lengths,
-        "J": like("J"),
-    }
+    floors = {"N": like("N"), "N.m": like("N") * lengths, "J": like("J"), "rad/s": speed, "rad/s2": speed**2}
+    floors |= {"m": lengths, "m/s": lengths * speed, "m/s2": lengths * speed**2}
     # the size of a residual's terms; without energies among the outputs, a torque is of the same dimension
     terms = {"m": lengths, "J": like("J") or like("N.m") or 1.0}
 
