@@ -83,13 +83,8 @@ def measure_other_masters(steps: Sequence[float], stop_time: float, out: Path) -
             ]
             errors[master] = np.abs(np.array(ends) - right) / abs(right)
     none: dict[str, np.ndarray] = {master: np.zeros(len(steps)) for master in errors}
-    found = Convergence(
-        title="Motor, shaft and five-bar slider, other masters: crank speed at the end",
-        steps=np.array(steps),
-        errors=errors,
-        powers=none,
-        messages={},
-    )
+    title = "Motor, shaft and five-bar slider, other masters: crank speed at the end"
+    found = Convergence(title=title, steps=np.array(steps), errors=errors, powers=none, messages={})
     show(found, powers=False)
     figures.plot(found).savefig(out / "coupling-masters.png", dpi=110)
 

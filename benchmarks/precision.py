@@ -101,27 +101,11 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
             # there are fewer colours than solvers: the others repeat a colour with a broken line
             again = len(curves) >= len(COLOURS)
             line, label = "--" if again else "-", "" if panels else name
-            curves.append(
-                Curve(
-                    x=[p.seconds / unit for p in usable],
-                    y=[p.error for p in usable],
-                    label=label,
-                    marker="o",
-                    width=width,
-                    line=line,
-                    hollow=again,
-                )
-            )
-        panels.append(
-            Panel(
-                x_label="time, over that of our integration to 1e-6",
-                y_label="error of the slider position",
-                title=_TITLES[case],
-                curves=curves,
-                logarithmic="xy",
-                legend_at="" if panels else "outside",
-            )
-        )
+            times, errors = [p.seconds / unit for p in usable], [p.error for p in usable]
+            curves.append(Curve(x=times, y=errors, label=label, marker="o", width=width, line=line, hollow=again))
+        x, y = "time, over that of our integration to 1e-6", "error of the slider position"
+        at = "" if panels else "outside"
+        panels.append(Panel(x_label=x, y_label=y, title=_TITLES[case], curves=curves, logarithmic="xy", legend_at=at))
     return plot_curves(panels, title="Work and precision")
 
 

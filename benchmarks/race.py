@@ -307,10 +307,5 @@ if __name__ == "__main__":
     parser.add_argument("--again", choices=tuple(RACERS), action="append", default=[], help="run this search afresh")
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV file with the results")
     given = parser.parse_args()
-    main(
-        given.results,
-        [target for target in TARGETS if not given.target or target.name in given.target],
-        given.search or tuple(RACERS),
-        given.budget,
-        given.again,
-    )
+    chosen = [target for target in TARGETS if not given.target or target.name in given.target]
+    main(given.results, chosen, given.search or tuple(RACERS), given.budget, given.again)

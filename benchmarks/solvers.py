@@ -75,14 +75,8 @@ def time_scipy(case: Case) -> Timing:
         run = partial(run_scipy, case, method)
         rtol, error, reached = loosest_setting(lambda rtol, run=run: relative_error(case, run(rtol)), TOLERANCES)
         if reached:
-            timings.append(
-                Timing(
-                    solver="SciPy, plain-Python right-hand side",
-                    seconds=shortest_time(partial(run, rtol), 3),
-                    error=error,
-                    note=f"{method}, rtol {rtol:.1e}",
-                )
-            )
+            solver, seconds = "SciPy, plain-Python right-hand side", shortest_time(partial(run, rtol), 3)
+            timings.append(Timing(solver=solver, seconds=seconds, error=error, note=f"{method}, rtol {rtol:.1e}"))
     return min(timings, key=lambda timing: timing.seconds)
 
 
@@ -112,14 +106,9 @@ def main() -> None:
         headings = ("solver", "error", "time [ms]", "times the integration", "times the whole call", "setting")
         table = tables.numbers(f"{case.name}: error in u at most {ACCURACY:g}", headings, ("solver", "setting"))
         for timing in timings:
-            table.add_row(
-                timing.solver,
-                f"{timing.error:.1e}",
-                f"{timing.seconds * 1e3:.3f}",
-                f"{timing.seconds / timings[0].seconds:.1f}",
-                f"{timing.seconds / timings[1].seconds:.1f}",
-                timing.note,
-            )
+            ratios = (f"{timing.seconds / ours.seconds:.1f}" for ours in timings[:2])
+            row = timing.solver, f"{timing.error:.1e}", f"{timing.seconds * 1e3:.3f}", *ratios, timing.note
+            table.add_row(*row)
         console.print(table)
         console.print(remark, highlight=False)
         if missing:

@@ -121,12 +121,8 @@ def main(points: int = POINTS, cores: int = 2) -> None:
     per_point = 1e3 * cores / points**2
     table.add_row("periodic.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
     table.add_row("the same again, from the cache on disk", f"{again:.2f}", "", "")
-    table.add_row(
-        f"SciPy DOP853, plain (from {ROWS * RUN} points)",
-        f"{theirs:.0f}",
-        f"{theirs * per_point:.2f}",
-        f"{theirs / ours:.0f}",
-    )
+    plain = f"SciPy DOP853, plain (from {ROWS * RUN} points)"
+    table.add_row(plain, f"{theirs:.0f}", f"{theirs * per_point:.2f}", f"{theirs / ours:.0f}")
     console = Console(width=120)
     console.print(table)
     found = int((~np.ma.getmaskarray(chart.largest)).sum())

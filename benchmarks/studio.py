@@ -97,14 +97,8 @@ def measure_page(browser: Any, seconds: float = 4.0) -> Figures:
     frames = np.array(page.evaluate("window.frames_.slice(2)"))
     squares = page.evaluate("window.studio.charts.stability.cells.size") - already
     page.close()
-    return Figures(
-        first,
-        (float(np.median(verdicts)), float(max(verdicts))),
-        _spread(frames),
-        _spread(work),
-        float(np.mean(frames > 1.5 * REFRESH)),
-        int(squares),
-    )
+    verdict, late = (float(np.median(verdicts)), float(max(verdicts))), float(np.mean(frames > 1.5 * REFRESH))
+    return Figures(first, verdict, _spread(frames), _spread(work), late, int(squares))
 
 
 def _spread(values: np.ndarray) -> tuple[float, float, float]:

@@ -251,20 +251,14 @@ def start_table() -> Table:
     texts = ("path", "starts", "method")
     headings = (*texts, "at the optimum", "ms a start", "times least squares")
     table = tables.numbers(f"ellipse a with bounds only, {STARTS} starts", headings, texts)
-    for weighted in (False, True):
+    for weighted, path in ((False, "unweighted"), (True, f"weighted {WEIGHT:g} to 1")):
         cases = {kind: convergence(weighted, kind == "scan") for kind in ("scan", "random")}
         best = min(q for found in cases.values() for s in found for q in s.qualities)
         for kind, found in cases.items():
             for s in found:
                 reached = sum(q <= (1.0 + NEAR) * best for q in s.qualities)
-                table.add_row(
-                    f"weighted {WEIGHT:g} to 1" if weighted else "unweighted",
-                    kind,
-                    s.method,
-                    f"{reached} of {len(s.qualities)}",
-                    f"{1e3 * s.seconds:.1f}",
-                    f"{s.seconds / found[0].seconds:.1f}",
-                )
+                share, ratio = f"{reached} of {len(s.qualities)}", f"{s.seconds / found[0].seconds:.1f}"
+                table.add_row(path, kind, s.method, share, f"{1e3 * s.seconds:.1f}", ratio)
             table.add_section()
     return table
 

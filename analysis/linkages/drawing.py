@@ -32,12 +32,8 @@ class Picture:
         joints = [PicturePoint(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)", False) for own in points]
         lines = sliders(self.structure)
         for name, joint in lines.items():
-            block, line, start, origin = (
-                joint.bodies[1],
-                f"b.{name}_line",
-                f"b.at_{joint.through}",
-                f"{joint.bodies[1]}_frame.origin",
-            )
+            block = joint.bodies[1]
+            line, start, origin = f"b.{name}_line", f"b.at_{joint.through}", f"{block}_frame.origin"
             end = f"*({start}.x + {length!r} * {line}.c, {start}.y + {length!r} * {line}.s, 0.0)"
             joints.append(PicturePoint(f"{name}Block", f"the {block}", f"*(b.{origin}.x, b.{origin}.y, 0.0)"))
             joints.append(PicturePoint(f"{name}End", f"direction of {name}", end))

@@ -64,14 +64,9 @@ class Outputs:
             yield Output(drive.coordinate, drive.unit, text, shown, f"x[{k}]")
             shown = f'*RATE, rate_of="{drive.coordinate}"{display_argument(rate_unit)}'
             yield Output(drive.rate, rate_unit, f"Rate of the freedom {drive.name}", shown, f"x[{n + k}]")
-            of = f'rate_of="{drive.rate}"'
-            yield Output(
-                f"{drive.name}.acceleration",
-                f"{rate_unit}2",
-                f"Acceleration of the freedom {drive.name}",
-                of,
-                f"m.accelerations[{k}]",
-            )
+            name, of = f"{drive.name}.acceleration", f'rate_of="{drive.rate}"'
+            text = f"Acceleration of the freedom {drive.name}"
+            yield Output(name, f"{rate_unit}2", text, of, f"m.accelerations[{k}]")
         for k, drive in enumerate(self.interface.drives):
             if drive.table:
                 text = f"The {drive.load} that drives {drive.name}: given, or as the commanded rate requires"

@@ -39,13 +39,8 @@ def check_repetition(context: Context, case: int) -> None:
     expected = _run_steps(first, steps)
     first.session.need("Reset")
     again = Run(first.session, instantiate=False)
-    _compare(
-        context,
-        expected,
-        _run_steps(again, steps),
-        "Reset: another run",
-        "a run after Reset is not that of a new instance",
-    )
+    what = "a run after Reset is not that of a new instance"
+    _compare(context, expected, _run_steps(again, steps), "Reset: another run", what)
     again.session.free()
     if context.model.once:
         return
@@ -55,13 +50,8 @@ def check_repetition(context: Context, case: int) -> None:
         courses[0].extend(_run_steps(one, [inputs]))
         courses[1].extend(_run_steps(other, [different]))
     one.session.free()
-    _compare(
-        context,
-        expected,
-        courses[0],
-        "two instances: another run",
-        "a run beside another instance is not that of one alone",
-    )
+    what = "a run beside another instance is not that of one alone"
+    _compare(context, expected, courses[0], "two instances: another run", what)
     other.step(step_size(context.model))
     other.session.free()
 

@@ -65,12 +65,8 @@ def check(
     if interface not in CHECKED:
         raise InputError(f"interface is {interface!r}: it must be {' or '.join(CHECKED)}")
     held = interface == "co-simulation"
-    common: dict[str, Any] = {
-        "initial": case.initial,
-        "stop_time": case.stop_time,
-        "step": case.step,
-        "progress": progress,
-    }
+    common: dict[str, Any] = {"initial": case.initial, "stop_time": case.stop_time, "step": case.step}
+    common["progress"] = progress
     own, others = (case.tolerance if held else max(share * case.tolerance, 1e-13) for share in (1e-4, 0.01))
     in_process = simulate(
         case.parameters, case.inputs, hold=case.step if held else None, method=method, tolerance=own, **common
