@@ -73,6 +73,8 @@ def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
 class Equilibrium:
     """A configuration in which a mechanism stays at rest.
 
+    ``rest["slider.position"]`` is an output of the mechanism in this configuration.
+
     Attributes
     ----------
     parameters
@@ -90,10 +92,6 @@ class Equilibrium:
         Norm of the imbalance, relative to the forces that balance each other.
     iterations : int
         Iterations of Newton's method.
-
-    Notes
-    -----
-    ``rest["slider.position"]`` is an output of the mechanism in this configuration.
     """
 
     parameters: Parameters

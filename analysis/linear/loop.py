@@ -63,7 +63,7 @@ class SampledController:
         self.period = period
         self.limit = limit
         self.integral = 0.0
-        self.channel = design.channel
+        self.channel, self.method = design.channel, design.method
         self._place = design.freedom
         self._gains: list[float] = design.plant_values(design.gains).tolist()
         self._target: list[float] = design.plant_values(design.target).tolist()
@@ -72,11 +72,6 @@ class SampledController:
     def reset(self) -> None:
         """Set the integral of the control error to zero."""
         self.integral = 0.0
-
-    @property
-    def method(self) -> str:
-        """Name of the design method."""
-        return self.design.method
 
     def force(self, measured: Sequence[float], reference: float) -> float:
         """Return the force for the next period; ``measured`` has all coordinates, then all rates."""

@@ -65,6 +65,8 @@ class Orbit(Protocol):
 class PeriodicModel(Matrices):
     """Linear models of a mechanism at s evenly spaced times of a periodic motion; see `Matrices`.
 
+    ``model[k]`` is the `LinearModel` at one of the times.
+
     Attributes
     ----------
     period : float
@@ -73,10 +75,6 @@ class PeriodicModel(Matrices):
         States of the motion at the times k period / s, k = 0 ... s - 1.
     channels : ndarray, shape (s, channels)
         Values of the mechanism's channels at these times.
-
-    Notes
-    -----
-    ``model[k]`` is the `LinearModel` at one of the times.
     """
 
     period: float

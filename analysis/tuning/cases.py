@@ -65,14 +65,8 @@ class TuneTable:
 class TuningCase:
     """A case file of a tuning.
 
-    Attributes
-    ----------
-    title : str
-    wish : Wish
-    tables : mapping
-        The tables of the file without ``[tune]``: the mechanism and its inputs.
-    folder : path
-        Folder to which the names of files in the case are relative.
+    ``tables`` are the tables of the file without ``[tune]``: the mechanism and its inputs. The names of files in the case are
+    relative to ``folder``.
     """
 
     title: str

@@ -42,15 +42,8 @@ _DIFFERENCE = 1e-7
 class CrossingCurve:
     """A curve of folds, period doublings or torus points over two parameters.
 
-    Attributes
-    ----------
-    kind : Crossing
-    points : ndarray, shape (m, 2)
-        Values of the two parameters along the curve.
-    orbits : tuple of PeriodicOrbit
-        The orbit at each point.
-    ends : (End, End)
-        Why the curve ends at its first and at its last point.
+    ``points`` are the values of the two parameters along the curve, shape (m, 2), and ``orbits`` the m motions there; ``ends``
+    tell why the curve ends at its first and at its last point.
     """
 
     kind: Crossing

@@ -63,16 +63,8 @@ _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
 class Axis:
     """An axis of a chart as it is printed and drawn: in the units of the tables, such as rpm and mm.
 
-    Attributes
-    ----------
-    name : str
-        FMI name.
-    unit : str
-        Unit for printing and drawing.
-    factor : float
-        Factor from SI to ``unit``.
-    si : str
-        SI unit.
+    ``name`` is the parameter's FMI name, ``unit`` the unit for printing and drawing, ``factor`` the factor to it from ``si``,
+    the SI unit.
     """
 
     name: str

@@ -82,12 +82,9 @@ def _solve_row(
 
 
 class GridInterrupted(Interrupted):
-    """The computation of a grid was interrupted; the finished rows are kept, and the same call continues from them.
+    """The computation of a grid was interrupted with ``done`` of ``rows`` rows finished.
 
-    Attributes
-    ----------
-    done, rows : int
-        Number of finished rows, and number of all rows.
+    The finished rows are kept, and the same call continues from them.
     """
 
     def __init__(self, done: int, rows: int, folder: Path) -> None:

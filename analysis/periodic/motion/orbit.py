@@ -64,6 +64,8 @@ OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 class Turn:
     """One period of an orbit, sampled at equal steps of the crank angle; the end of the period is not a sample.
 
+    ``turn["slider.position"]`` is an output over the period, shape (n,).
+
     Attributes
     ----------
     angle : ndarray, shape (n,)
@@ -88,10 +90,6 @@ class Turn:
         Amplitudes of ``swings`` up to these sizes count as rounding errors.
     angles : frozenset of str
         Outputs that are angles.
-
-    Notes
-    -----
-    ``turn["slider.position"]`` is an output over the period, shape (n,).
     """
 
     angle: FloatArray

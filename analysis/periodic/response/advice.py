@@ -76,14 +76,9 @@ class AvoidedRange:
 class FoldJump:
     """The jump of a machine at a fold at which its stable motion ends.
 
-    ``parameter`` is the value of the parameter at the fold, ``before`` the amplitude of the motion that ends.
-
-    Attributes
-    ----------
-    direction : int
-        +1 if the motion exists below the fold and ends as the parameter rises, -1 if the motion ends as the parameter falls.
-    after : tuple of float
-        Amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
+    ``parameter`` is the value of the parameter at the fold, ``before`` the amplitude of the motion that ends. ``direction`` is
+    +1 if the motion exists below the fold and ends as the parameter rises, -1 if it ends as the parameter falls. ``after`` are
+    the amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
     """
 
     parameter: float
@@ -366,18 +361,9 @@ _SAMPLED = 1e-6
 class Extremum:
     """A local maximum or minimum of the amplitude over the parameter of a family.
 
-    Attributes
-    ----------
-    parameter : float
-        Value of the parameter at the extremum, such as the speed (rad/s).
-    amplitude : float
-        Amplitude of the coordinate (m for a slider).
-    stability : Stability
-        Stability of the motion at the extremum.
-    orbit : PeriodicOrbit
-        The motion at the extremum.
-    coordinate : int
-        Index of the free coordinate in `PeriodicOrbit.swings`.
+    ``parameter`` is the value of the parameter at the extremum, such as the speed (rad/s), ``amplitude`` that of the coordinate
+    (m for a slider), and ``stability`` that of ``orbit``, the motion there. ``coordinate`` is the index of the free coordinate
+    in `PeriodicOrbit.swings`.
     """
 
     parameter: float
@@ -422,8 +408,7 @@ def _locate_extremum(branch: Branch, point: int, sign: int, coordinate: int) -> 
     folded = not a < begin < c
 
     def nearby_orbit(value: float, near: FloatArray = orbit.start) -> PeriodicOrbit:
-        parameters, drive = family.operation(value)
-        return newton_orbit(parameters, drive, turns=orbit.turns, start=near, settle=False)
+        return newton_orbit(*family.operation(value), turns=orbit.turns, start=near, settle=False)
 
     if isinstance(family.vary, str):
         try:

@@ -35,16 +35,8 @@ from ..motion.variables import Family
 class SpecialPoint:
     """A point of a branch at which a multiplier crosses the unit circle.
 
-    Attributes
-    ----------
-    kind : Crossing
-        FOLD, BRANCH_POINT, PERIOD_DOUBLING or TORUS.
-    parameter : float
-        Value of the branch's parameter.
-    orbit : PeriodicOrbit
-        The motion at the point.
-    after : int
-        Index of the last point of the branch before the special point.
+    ``parameter`` is the value of the branch's parameter at the point, ``orbit`` the motion there, and ``after`` the index of
+    the last point of the branch before the special point.
     """
 
     kind: Crossing
@@ -296,8 +288,8 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
 
     def find_nearby(value: float) -> PeriodicOrbit:
-        parameters, drive = family.operation(value)
-        return newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
+        at = special.orbit
+        return newton_orbit(*family.operation(value), turns=at.turns, start=at.start, settle=False)
 
     step = 1e-3 * max(abs(special.parameter), 1e-9)
     largest = [find_nearby(special.parameter + sign * step).largest for sign in (-1.0, 1.0)]

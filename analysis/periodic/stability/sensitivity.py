@@ -38,6 +38,8 @@ _DOUBLE = 1e-6
 class Gradient:
     """A quantity with its derivatives with respect to parameters.
 
+    ``gradient["slider.damping"]`` is one derivative.
+
     Attributes
     ----------
     value : float
@@ -48,10 +50,6 @@ class Gradient:
         Derivatives of the quantity with respect to the parameters, in SI units.
     at : ndarray, shape (m,)
         Values of the parameters.
-
-    Notes
-    -----
-    ``gradient["slider.damping"]`` is one derivative.
     """
 
     value: float
@@ -84,16 +82,8 @@ class Gradient:
 class PointGradient:
     """The derivatives, with respect to parameters, of a special point: a resonance, fold, period doubling or torus point.
 
-    Attributes
-    ----------
-    along : str
-        FMI name of the branch's parameter, such as ``drive.speed``.
-    place : Gradient
-        Gradient of the value of the branch's parameter at the point, with respect to the other parameters.
-    amplitude : Gradient
-        Gradient of the amplitude of the motion at the point.
-    orbit : PeriodicOrbit
-        The motion at the point.
+    ``along`` is the FMI name of the branch's parameter, such as ``drive.speed``. ``place`` is the gradient of this parameter's
+    value at the point with respect to the other parameters, ``amplitude`` that of the amplitude of ``orbit``, the motion there.
     """
 
     along: str
