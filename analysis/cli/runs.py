@@ -97,6 +97,8 @@ def run(
     _print_extremes(chosen.title, result)
     common.say(describe_masses(chosen.masses)[0])
     common.print_paths(written)
+    for sentence in _coarse_samples(result):
+        common.note(sentence)
     if fmu is not None and interface in (None, "co-simulation") and not chosen.inputs.held_exactly:
         common.note(
             f"inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
@@ -112,6 +114,29 @@ def run(
         sys.exit(common.ENDED_EARLY)
     if result.message:
         common.note(result.message)
+
+
+#: Greatest part of a turn between two samples without a note, and part of a turn of the step that the note proposes.
+_COARSE, _FINE = 0.25, 1.0 / 72.0
+
+
+def _coarse_samples(result: Any) -> Iterator[str]:
+    """Yield a note for each crank that turns so far between two samples that extremes between them are missed."""
+    import numpy as np
+
+    from ..mechanisms import find_mechanism
+
+    mechanism = None if result.parameters is None else find_mechanism(result.parameters)
+    for crank in () if mechanism is None or len(result) < 2 else mechanism.cyclic_freedoms:
+        name = mechanism.freedoms[crank].coordinate
+        turns = np.abs(np.diff(result[name])) / (2.0 * np.pi)
+        most, step = float(turns.max()), float(np.diff(result.time)[turns.argmax()])
+        if most > _COARSE:
+            yield (
+                f"{name} advances by up to {most:.3g} turns from one sample to the next, where it has "
+                f"{60.0 * most / step:.4g} rpm: extremes between the samples are missed. "
+                f"--step '{1e3 * step * _FINE / most:.2g} ms' has 72 samples a turn there"
+            )
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:

@@ -300,6 +300,18 @@ def test_the_failing_kind_is_named(linkwork, natives):
     assert result.stderr.strip() == "check failed: coulomb-friction-native-model-exchange"
 
 
+@pytest.mark.parametrize(("step", "turns"), [("10 ms", ""), ("50 ms", "0.35"), ("100 ms", "0.7")])
+def test_samples_too_few_for_the_extremes_are_noted(linkwork, step: str, turns: str) -> None:
+    """At 420 rpm."""
+    result = linkwork("run", "--published", "table-3.1", "--stop-time", "0.4 s", "--step", step, "--no-plot")
+    assert result.exit_code == 0
+    said = " ".join(result.stderr.split())
+    assert ("crank.angle advances by up to" in said) == bool(turns)
+    if turns:
+        assert f"by up to {turns} turns from one sample to the next, where it has 420 rpm" in said
+        assert "--step '2 ms' has 72 samples a turn there" in said
+
+
 @pytest.mark.parametrize("interface", ["co-simulation", "linear-co-simulation", "model-exchange"])
 def test_run_through_each_interface(linkwork, natives, tmp_path, interface):
     fmu = natives["FiveBarSlider-native"]
