@@ -109,13 +109,8 @@ def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray
     """
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
-    return minimize(
-        score,
-        first,
-        method="Nelder-Mead",
-        bounds=Bounds(box.low, box.high),
-        options={"initial_simplex": simplex, "maxfev": EVALUATIONS * len(first), "xatol": 1e-7, "fatol": 1e-12},
-    )
+    options = {"initial_simplex": simplex, "maxfev": EVALUATIONS * len(first), "xatol": 1e-7, "fatol": 1e-12}
+    return minimize(score, first, method="Nelder-Mead", bounds=Bounds(box.low, box.high), options=options)
 
 
 class BlackBox:

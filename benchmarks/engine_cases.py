@@ -134,17 +134,10 @@ def run_scipy(case: Case, method: str, rtol: float, atol: float | None = None) -
     x = np.array([0.0, 0.0, case.start_speed, 0.0])
     u = [0.0]
     while len(u) < times.size:
-        leg = solve_ivp(
-            rate,
-            (start, case.duration),
-            x,
-            method=method,
-            t_eval=times[len(u) :],
-            events=switch if torque else None,
-            args=(torque,),
-            rtol=rtol,
-            atol=rtol * scale if atol is None else atol,
-        )
+        events = switch if torque else None
+        tolerances = {"rtol": rtol, "atol": rtol * scale if atol is None else atol}
+        span, left = (start, case.duration), times[len(u) :]
+        leg = solve_ivp(rate, span, x, method, t_eval=left, events=events, args=(torque,), **tolerances)
         u.extend(leg.y[1])
         if leg.status != 1:
             break

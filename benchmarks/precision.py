@@ -139,13 +139,8 @@ def cost_picture(rows: list[tuple[int, float, float]]) -> Any:
         Curve(x=counts, y=apart, label="one after the other", marker="o"),
         Curve(x=counts, y=lanes, label="in lanes", marker="o", width=2.2),
     ]
-    panel = Panel(
-        x_label="runs",
-        y_label="time of a run, over that of one alone",
-        curves=curves,
-        logarithmic="xy",
-        legend_at="best",
-    )
+    y = "time of a run, over that of one alone"
+    panel = Panel(x_label="runs", y_label=y, curves=curves, logarithmic="xy", legend_at="best")
     return plot_curves([panel], title="Cost of a run in an ensemble: Table 3.1, 0.1 s, one core")
 
 

@@ -59,14 +59,8 @@ def scipy_orbit(
     y = guess.copy()
     for _ in range(20):
         start = (y + STEP * np.array([[0.0, 0.0], [scale[0], 0.0], [0.0, scale[1]]])).ravel()
-        end = solve_ivp(
-            rate,
-            (0.0, 2.0 * pi / speed),
-            start,
-            method="DOP853",
-            rtol=INTEGRATOR_TOLERANCE,
-            atol=INTEGRATOR_TOLERANCE * np.tile(scale, 3),
-        ).y[:, -1]
+        tolerances = {"rtol": INTEGRATOR_TOLERANCE, "atol": INTEGRATOR_TOLERANCE * np.tile(scale, 3)}
+        end = solve_ivp(rate, (0.0, 2.0 * pi / speed), start, "DOP853", **tolerances).y[:, -1]
         matrix = np.column_stack([(end[2:4] - end[:2]) / (STEP * scale[0]), (end[4:] - end[:2]) / (STEP * scale[1])])
         correction = np.linalg.solve(np.eye(2) - matrix, end[:2] - y)
         y = y + correction

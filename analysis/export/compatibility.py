@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -99,15 +98,8 @@ def reference_results(mechanism: Mechanism) -> tuple[list[str], list[list[float]
 def format_options(mechanism: Mechanism) -> str:
     """Format the options of the reference and the tolerances for an importer, as lines of comma-separated values."""
     start, stop, step, _ = mechanism.experiment
-    values: Mapping[str, float | str] = {
-        "StartTime": start,
-        "StopTime": stop,
-        "StepSize": step,
-        "RelTol": RELATIVE,
-        "AbsTol": ABSOLUTE,
-        "SolverType": "FixedStep",
-        "OutputIntervalLength": step,
-    }
+    numbers = {"StartTime": start, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE, "AbsTol": ABSOLUTE}
+    values = {**numbers, "SolverType": "FixedStep", "OutputIntervalLength": step}
     return "".join(f"{name}, {value}\n" for name, value in values.items())
 
 

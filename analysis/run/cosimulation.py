@@ -357,15 +357,8 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
                 difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
         # NaN differs from everything
         difference[np.isnan(difference)] = np.inf
-        differences.append(
-            OutputDifference(
-                name=name,
-                unit=units[name],
-                largest=float(difference.max()),
-                rms=float(np.sqrt(np.mean(difference**2))),
-                scale=scales[name],
-            )
-        )
+        worst, rms = float(difference.max()), float(np.sqrt(np.mean(difference**2)))
+        differences.append(OutputDifference(name=name, unit=units[name], largest=worst, rms=rms, scale=scales[name]))
     return Comparison(differences=tuple(differences), tolerance=tolerance)
 
 

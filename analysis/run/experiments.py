@@ -351,14 +351,7 @@ def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str
         difference = np.abs(values - reference[name])
         difference[np.isnan(difference)] = np.inf
         worst = int(np.argmax(difference))
-        deviations.append(
-            Deviation(
-                name=name,
-                unit=units[name],
-                time=float(times[worst]),
-                value=float(values[worst]),
-                reference=float(reference[name][worst]),
-                relative=float(difference[worst]) / scale,
-            )
-        )
+        at, value, right = float(times[worst]), float(values[worst]), float(reference[name][worst])
+        share = float(difference[worst]) / scale
+        deviations.append(Deviation(name=name, unit=units[name], time=at, value=value, reference=right, relative=share))
     return tuple(sorted(deviations, key=lambda d: -d.relative))
