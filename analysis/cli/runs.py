@@ -126,8 +126,10 @@ def _coarse_samples(result: Any) -> Iterator[str]:
 
     from ..mechanisms import find_mechanism
 
-    mechanism = None if result.parameters is None else find_mechanism(result.parameters)
-    for crank in () if mechanism is None or len(result) < 2 else mechanism.cyclic_freedoms:
+    if result.parameters is None or len(result) < 2:
+        return
+    mechanism = find_mechanism(result.parameters)
+    for crank in mechanism.cyclic_freedoms:
         name = mechanism.freedoms[crank].coordinate
         turns = np.abs(np.diff(result[name])) / (2.0 * np.pi)
         most, step = float(turns.max()), float(np.diff(result.time)[turns.argmax()])
