@@ -66,13 +66,10 @@ def block(statement: Statement) -> Iterator[str]:
         for case in cases:
             why = f": {case.why}" if statement.reasons_differ and not case.holds and case.why else ""
             outcome = case.outcome if case.holds else f"**{case.outcome}**{why}"
-            yield f"| {' | '.join(map(_escaped, (case.label, case.expected, case.allowed, case.found, outcome)))} |"
+            # a bar would end a cell of the table
+            cells = [x.replace("|", "\\|") for x in (case.label, case.expected, case.allowed, case.found, outcome)]
+            yield f"| {' | '.join(cells)} |"
         yield ""
-
-
-def _escaped(text: str) -> str:
-    """Escape the vertical bars in a text, which would end a cell of a Markdown table."""
-    return text.replace("|", "\\|")
 
 
 def save_small(figure: Figure, path: Path) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import partial
 from typing import NamedTuple, SupportsFloat
 
 import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
 
 #: Kinds of sources: the thesis's text, and its program when run.
 TEXT, LISTING = "text", "listing"
@@ -36,8 +38,9 @@ class Source(NamedTuple):
         return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
 
 
-#: Sources of statements by their place in the thesis: in its text, and printed by the program of a listing there.
-text, listing = partial(Source, TEXT), partial(Source, LISTING)
+def listing(place: str) -> Source:
+    """Return the source of a statement that the program of a listing prints."""
+    return Source(LISTING, place)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,10 +104,7 @@ class Case:
 
     @property
     def found(self) -> str:
-        """Return the computed value with unit, to four digits or one more than the stated number; empty if there is none.
-
-        A rounding error, below `ROUNDING_ERROR`, has one digit.
-        """
+        """Return the computed value with unit, to four digits or one more than stated; a rounding error has one digit."""
         if self.computed is None:
             return ""
         digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))
@@ -141,6 +141,16 @@ def at_most(label: str, stated: str | float, computed: SupportsFloat, unit: str 
     return _case(label, stated, computed, unit, why, upper=float(stated))
 
 
+def within(label: str, lower: float, upper: float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
+    """Return a case that holds if the computed value is in a range that the thesis gives in words."""
+    return _case(label, "", computed, unit, why, lower=lower, upper=upper)
+
+
+def unjudged(label: str, why: str) -> Case:
+    """Return a case that cannot be judged, with the reason."""
+    return Case(label=label, computed=None, why=why)
+
+
 def _case(label: str, stated: str | float, computed: SupportsFloat, unit: str, why: str, **bounds: float) -> Case:
     printed = stated if isinstance(stated, str) else ""
     return Case(label=label, stated=printed, computed=float(computed), unit=unit, why=why, **bounds)
@@ -165,10 +175,10 @@ class Statement:
 
     quote: str
     source: Source
-    measure: str = ""
-    tolerance: str = ""
-    cases: tuple[Case, ...] = ()
-    why: str = ""
+    measure: str
+    tolerance: str
+    cases: tuple[Case, ...]
+    why: str
 
     @property
     def outcome(self) -> str:
@@ -202,3 +212,11 @@ class Statement:
             why = [case.why] if self.reasons_differ and not case.holds else []
             lines.append("; ".join([f"    {case.label}: {case.outcome}", *case.numbers, *why]))
         return "\n".join(lines)
+
+
+def statement(
+    quote: str, place: str | Source, measure: str = "", tolerance: str = "", *cases: Case, why: str = ""
+) -> Statement:
+    """Return a sentence of the thesis with its cases; ``place`` is in the thesis's text, unless it is a `listing`."""
+    source = Source(TEXT, place) if isinstance(place, str) else place
+    return Statement(quote, source, measure, tolerance, cases, why)

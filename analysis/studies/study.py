@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from linkwork.errors import InputError
 
 from ..figures import Curve, Figure
 from ..files import save_figure, unknown_name, write_csv
 from . import STUDIES, file_stem, is_figure
-from .statements import Statement
+from .statements import FloatArray, Statement
 from .variation import varied, words
 
 
@@ -40,7 +40,7 @@ class StudyResult:
 
     claim: str
     assignment: str = ""
-    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    columns: Mapping[str, FloatArray] = field(default_factory=dict)
     statements: tuple[Statement, ...] = ()
     see: str = ""
     number: str = ""
@@ -118,7 +118,7 @@ class Study:
         return tuple(paths)
 
 
-def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
+def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
     """Return the columns padded with NaN to the length of the longest column."""
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     length = max(len(values) for values in arrays.values())
@@ -126,8 +126,5 @@ def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float6
 
 
 def result_curves(result: StudyResult, x: str, names: Mapping[str, str], **look: Any) -> list[Curve]:
-    """Return columns of a result as curves over the column ``x``; ``names`` maps the name of each column to its label.
-
-    ``look`` are further attributes that all curves share.
-    """
+    """Return columns as curves over the column ``x`` that share ``look``; ``names`` maps column names to labels."""
     return [Curve(x=result.columns[x], y=result.columns[name], label=label, **look) for name, label in names.items()]

@@ -174,11 +174,10 @@ def test_the_argument_of_the_root_is_that_of_assembly() -> None:
     assert np.array_equal(assembly_arguments()[:200] >= 0.0, closes)
 
 
-def test_a_test_of_assembly_stops_at_its_first_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_test_of_assembly_stops_at_its_first_violation() -> None:
     arguments = np.ones((3, 72))
     arguments[1, 0], arguments[2, 5] = -1.0, -1.0
-    monkeypatch.setattr(quality, "assembly_arguments", lambda: arguments)
-    assert quality.share_of_values() == (2 + 1 + 2) / (72 + 1 + 6)
+    assert quality.share_of_values(arguments) == (2 + 1 + 2) / (72 + 1 + 6)
 
 
 class TestSearch:

@@ -1,6 +1,6 @@
 """The conclusions of Youssef's thesis, sections 8.0 and 9.1."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_verdicts() -> None:
 
 
 @pytest.mark.parametrize("part", [judge_introduction, judge_linearised])
-def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...]]) -> None:
+def test_verdicts_on_the_linear_equation(part: Callable[[], Iterable[Statement]]) -> None:
     """Those that take no run of the mechanism."""
     for s in part():
         (outcome,) = [verdict for quote, verdict in expected("conclusions").items() if s.quote.startswith(quote)] or [

@@ -9,7 +9,18 @@ from PIL import Image
 
 from analysis import studies
 from analysis.studies.page import block
-from analysis.studies.statements import FAILS, HOLDS, IN_PART, UNJUDGED, Case, Statement, at_least, at_most, near, text
+from analysis.studies.statements import (
+    FAILS,
+    HOLDS,
+    IN_PART,
+    UNJUDGED,
+    Case,
+    at_least,
+    at_most,
+    near,
+    statement,
+    unjudged,
+)
 from analysis.studies.variation import cache, varied, vary
 from analysis.studies.youssef import linkage
 from analysis.units import INCH
@@ -109,7 +120,7 @@ class TestVariation:
 
 
 class TestStatements:
-    PLACE = text("3.2, L12")
+    PLACE = "3.2, L12"
     SHORT, LONG = near("short", "2.0", 2.04, unit="m"), near("long", "2.0", 2.06, unit="m", why="it sags")
 
     def test_a_printed_number_is_judged_to_half_a_unit_of_its_last_digit(self) -> None:
@@ -126,21 +137,21 @@ class TestStatements:
             ((SHORT, LONG), IN_PART),
             ((LONG,), FAILS),
             ((), UNJUDGED),
-            ((Case(label="lost", computed=None, why="no scale"), SHORT), IN_PART),
+            ((unjudged("lost", "no scale"), SHORT), IN_PART),
         ],
     )
     def test_one_verdict_for_all_cases(self, cases: tuple[Case, ...], outcome: str) -> None:
-        assert Statement("It is 2.0 m long.", self.PLACE, cases=cases).outcome == outcome
+        assert statement("It is 2.0 m long.", self.PLACE, "", "", *cases).outcome == outcome
 
     def test_the_terminal_says_statement_verdict_and_cases(self) -> None:
-        both = Statement("It is 2.0 m long.", self.PLACE, "length", "half a unit", (self.SHORT, self.LONG))
+        both = statement("It is 2.0 m long.", self.PLACE, "length", "half a unit", self.SHORT, self.LONG)
         assert str(both).splitlines() == [
             '"It is 2.0 m long." (the thesis, 3.2, line 12)',
             "  HOLDS IN PART: 1 of 2 cases; it sags",
             "    short: holds; stated 2.0 m; allowed 1.95 to 2.05; computed 2.04 m",
             "    long: does not hold; stated 2.0 m; allowed 1.95 to 2.05; computed 2.06 m",
         ]
-        lost = Statement("It is long.", self.PLACE, why="no scale")
+        lost = statement("It is long.", self.PLACE, why="no scale")
         assert str(lost).splitlines()[1] == "  CANNOT BE JUDGED: no scale"
 
     def test_bounds(self) -> None:
@@ -156,9 +167,9 @@ class TestStatements:
 
     def test_bars_do_not_break_the_page(self) -> None:
         """A single case stands in the line of the verdict, several in a table."""
-        one = Statement("|x| is 2.", self.PLACE, "|x|", "", (at_most("", "2", 3.0, why="|x| grows"),))
+        one = statement("|x| is 2.", self.PLACE, "|x|", "", at_most("", "2", 3.0, why="|x| grows"))
         assert list(block(one))[-2:] == ["**Does not hold**: stated 2; allowed at most 2; computed 3; |x| grows.", ""]
-        two = Statement("|x| is 2.", self.PLACE, "|x|", "", (self.SHORT, near("|x|", "1", 1.0)))
+        two = statement("|x| is 2.", self.PLACE, "|x|", "", self.SHORT, near("|x|", "1", 1.0))
         assert list(block(two))[-2] == r"| \|x\| | 1 | 0.5 to 1.5 | 1 | holds |"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from typing import cast
@@ -17,12 +18,12 @@ from ...slider_crank import assembly_margin, constant_shift, greatest_shift
 from ...slider_crank.closure import chain, equations, planar
 from ...units import INCH
 from ..statements import Case as Judged
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache, ignore_changes
 from .figures import ANGLE, CRANK, ROUNDING, nothing
 from .iteration import judge_convergence, judge_detection, judge_ends
-from .method import AT, OPEN, PLANE, ROD, ROUGH, SHIFT, FloatArray, H, case_turn, difference, draw, links
+from .method import AT, OPEN, PLANE, ROD, ROUGH, SHIFT, H, case_turn, difference, draw, links
 from .printed import GENERAL, GRID_DEG, MAX_STEPS, STEP, STEP_DEG, close_loop_combined, turn
 from .table import TWISTS_REACHED_DEG, Case
 
@@ -122,12 +123,7 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
 
 
 def _independent() -> tuple[int, float]:
-    """Return the number of independent equations in 19a, and the order to which the other equations agree with them.
-
-    The number is the rank of the left sides in a general position. Left sides on opposite sides of the diagonal add up to
-    zero, so their right sides should too. The order is the power of the opening (rad, in) with which these sums of right sides
-    decrease as a closed planar loop is opened less and less.
-    """
+    """Return the rank and the order that the statement on eq 19a lists."""
 
     def odds(q: FloatArray) -> float:
         _, right = _nine_equations(PLANE, AT, q)
@@ -171,16 +167,14 @@ def _settles_with_twist(twist_deg: float) -> bool:
     return bool(case_turn(Case("", 20.0, 0.0, twist_deg)).settled.all())
 
 
-def _settled_shares(a4: float) -> dict[float, float]:
-    """Return the share of `RUNS` runs that settle at every angle, by the shifts of `TRIED`, at an offset a4 (in)."""
-    off = OFF * np.random.default_rng(1991).standard_normal((TRIED.size * RUNS, 5))
-    settled = turn(parameters(a4), np.repeat(TRIED, RUNS), off=off).settled.reshape(-1, RUNS)
-    return dict(zip(TRIED.tolist(), settled.mean(-1).tolist()))
-
-
-def _limits() -> tuple[Statement, ...]:
+def _limits() -> Iterator[Statement]:
     """Judge the limits of S1 and alpha4 that section 3.2 states for the iteration."""
-    shares = {a4: _settled_shares(a4) for a4 in (0.0, 10.0, 20.0, 30.0)}
+    # of the runs, the share that settle at every angle, by offset and shift
+    off = OFF * np.random.default_rng(1991).standard_normal((TRIED.size * RUNS, 5))
+    shares = {}
+    for a4 in (0.0, 10.0, 20.0, 30.0):
+        settled = turn(parameters(a4), np.repeat(TRIED, RUNS), off=off).settled.reshape(-1, RUNS)
+        shares[a4] = dict(zip(TRIED.tolist(), settled.mean(-1).tolist()))
     last = {a4: max(s1 for s1, share in settled.items() if share > 0.0) for a4, settled in shares.items()}
     always = max(s1 for s1 in shares[30.0] if all(share == 1.0 for less, share in shares[30.0].items() if less <= s1))
     within = float(np.mean([_settles_with_twist(twist) for twist in np.linspace(*TWISTS_REACHED_DEG, 7).tolist()]))
@@ -190,113 +184,102 @@ def _limits() -> tuple[Statement, ...]:
         while _settles_with_twist(found + way):
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
-    place, step = text("section 3.2, L1121"), "0.5 in, the step in which S1 is tried and the stated limits are given"
-    no_offset, increased, twist = (
-        Statement(
-            "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
-            "converge if the term [S1] is greater than 1.5 inches.",
-            place,
-            f"greatest S1 at which the printed iteration settles at every angle in any of {RUNS} runs. S1 is tried in steps "
-            f"of half an inch up to {TRIED[-1]:g} in. The starts of the runs differ by {OFF:g} (rad, in), as rounding errors "
-            "would make them differ",
-            step,
-            (near("a4 = 0", "1.5", last[0.0], 0.5, "in"),),
-            "rounding errors decide: most of the runs settle at 0.5 and 1 in, about half at 1.5 in, and a few at 2 in. With at "
-            f"most 50 corrections instead of {MAX_STEPS}, it settles at S1 = 0 alone",
-        ),
-        Statement(
-            "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
-            "greater than 3.5 inches and when offset [a4] is 30 inches, the program converges as long as the term "
-            "[S1] is less than or equal to 9 inches.",
-            place,
-            "limit as in the row before; for *converges as long as*, greatest S1 up to which every run settles",
-            step,
-            (
-                Judged(
-                    label="fails beyond, a4 = 10 in",
-                    stated="3.5",
-                    computed=None,
-                    unit="in",
-                    why="every run settles up to 4 in, about half of them at 4.5 in and none at 5 in: rounding errors decide "
-                    "whether the limit is 4 in, within the tolerance, or 4.5 in",
-                ),
-                near(
-                    "fails beyond, a4 = 20 in, which is greater than 10 in",
-                    "3.5",
-                    last[20.0],
-                    0.5,
-                    "in",
-                    why="every run settles up to 6 in, none at 6.5 in, and some of them at most of the shifts from 7 to 11 in",
-                ),
-                near("converges up to, a4 = 30 in", "9", always, 0.5, "in"),
-            ),
-            "our choices matter: at a4 = 10 in the limit is 4 in with at most 100 corrections; with steps of 1 deg every run "
-            "settles up to 2.5 in, none at 3 in, and some at 3.5 in; at a4 = 30 in some runs settle at 12 in with at most "
-            "1000 corrections",
-        ),
-        Statement(
-            "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
-            "as offset [alpha4] is between 232 and 310 degrees.",
-            place,
-            "least and greatest alpha4, in steps of 1 deg, up to which the printed iteration settles at every angle; share "
-            "of seven twists, evenly spaced from 232 to 310 deg, at which it settles",
-            "1 deg, the step of alpha4; none for the share",
-            (*twists, at_least("232 to 310 deg", 1.0, within)),
-            "but the loops on which it settles are open (erratum 1). With at most 50 corrections instead of "
-            f"{MAX_STEPS}, it settles from 234 to 307 deg",
-        ),
+    place, step = "section 3.2, L1121", "0.5 in, the step in which S1 is tried and the stated limits are given"
+    yield statement(
+        "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
+        "converge if the term [S1] is greater than 1.5 inches.",
+        place,
+        f"greatest S1 at which the printed iteration settles at every angle in any of {RUNS} runs. S1 is tried in steps "
+        f"of half an inch up to {TRIED[-1]:g} in. The starts of the runs differ by {OFF:g} (rad, in), as rounding errors "
+        "would make them differ",
+        step,
+        near("a4 = 0", "1.5", last[0.0], 0.5, "in"),
+        why="rounding errors decide: most of the runs settle at 0.5 and 1 in, about half at 1.5 in, and a few at 2 in. "
+        f"With at most 50 corrections instead of {MAX_STEPS}, it settles at S1 = 0 alone",
     )
-    return no_offset, increased, *_mechanism_limits(), twist
+    yield statement(
+        "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
+        "greater than 3.5 inches and when offset [a4] is 30 inches, the program converges as long as the term "
+        "[S1] is less than or equal to 9 inches.",
+        place,
+        "limit as in the row before; for *converges as long as*, greatest S1 up to which every run settles",
+        step,
+        Judged(
+            label="fails beyond, a4 = 10 in",
+            stated="3.5",
+            computed=None,
+            unit="in",
+            why="every run settles up to 4 in, about half of them at 4.5 in and none at 5 in: rounding errors decide "
+            "whether the limit is 4 in, within the tolerance, or 4.5 in",
+        ),
+        near(
+            "fails beyond, a4 = 20 in, which is greater than 10 in",
+            "3.5",
+            last[20.0],
+            0.5,
+            "in",
+            why="every run settles up to 6 in, none at 6.5 in, and some of them at most of the shifts from 7 to 11 in",
+        ),
+        near("converges up to, a4 = 30 in", "9", always, 0.5, "in"),
+        why="our choices matter: at a4 = 10 in the limit is 4 in with at most 100 corrections; with steps of 1 deg every "
+        "run settles up to 2.5 in, none at 3 in, and some at 3.5 in; at a4 = 30 in some runs settle at 12 in with at most "
+        "1000 corrections",
+    )
+    yield from _mechanism_limits()
+    yield statement(
+        "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
+        "as offset [alpha4] is between 232 and 310 degrees.",
+        place,
+        "least and greatest alpha4, in steps of 1 deg, up to which the printed iteration settles at every angle; share "
+        "of seven twists, evenly spaced from 232 to 310 deg, at which it settles",
+        "1 deg, the step of alpha4; none for the share",
+        *twists,
+        at_least("232 to 310 deg", 1.0, within),
+        why="but the loops on which it settles are open (erratum 1). With at most 50 corrections instead of "
+        f"{MAX_STEPS}, it settles from 234 to 307 deg",
+    )
 
 
-def _mechanism_limits() -> tuple[Statement, Statement]:
+def _mechanism_limits() -> Iterator[Statement]:
     """Judge what section 3.2 infers from the limits of the iteration about the mechanism itself."""
     shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in (0.0, 10.0, 20.0, 30.0)}
 
     def margin(a4: float, shift: float) -> float:
         return float(assembly_margin(parameters(a4), constant_shift(shift * INCH)).length / INCH)
 
-    place = text("section 3.2, L1121")
-    return (
-        Statement(
-            "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
-            "the increase of crank axial shift, offset [a4] should be increased.",
-            place,
-            "change of the greatest S1 at which the crank turns fully with alpha4 = 270 deg, from one offset to the next",
-            "none, the sign decides",
-            tuple(
-                at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
-                for before, after in pairwise(shifts)
-            ),
-            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2), which falls with a4. The limits that the thesis found "
-            "belong to its iteration, not to the mechanism",
+    place = "section 3.2, L1121"
+    yield statement(
+        "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
+        "the increase of crank axial shift, offset [a4] should be increased.",
+        place,
+        "change of the greatest S1 at which the crank turns fully with alpha4 = 270 deg, from one offset to the next",
+        "none, the sign decides",
+        *(
+            at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
+            for before, after in pairwise(shifts)
         ),
-        Statement(
-            "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
-            "from another at the joint or the slider will go to the opposite side.",
-            place,
-            "margin of the rod's reach, the least over a turn. First with S1 larger than its greatest value by 1 in, our "
-            "choice: the margin is negative where the loop cannot close. Then at the greatest S1, the greatest margin of "
-            "the four offsets: it is zero where the two assemblies meet, so that the slider can go to the opposite side",
-            f"none, the sign decides; for zero {ROUNDING}",
-            (
-                *(
-                    at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
-                    for a4, shift in shifts.items()
-                ),
-                nothing("a4 = 0, 10, 20, 30 in, greatest S1", [margin(*at) for at in shifts.items()], "in"),
-            ),
-            "but where the thesis's program fails, the mechanism does not fail (row before)",
+        why="the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2), which falls with a4. The limits that the thesis found "
+        "belong to its iteration, not to the mechanism",
+    )
+    yield statement(
+        "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
+        "from another at the joint or the slider will go to the opposite side.",
+        place,
+        "margin of the rod's reach, the least over a turn. First with S1 larger than its greatest value by 1 in, our "
+        "choice: the margin is negative where the loop cannot close. Then at the greatest S1, the greatest margin of "
+        "the four offsets: it is zero where the two assemblies meet, so that the slider can go to the opposite side",
+        f"none, the sign decides; for zero {ROUNDING}",
+        *(
+            at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
+            for a4, shift in shifts.items()
         ),
+        nothing("a4 = 0, 10, 20, 30 in, greatest S1", [margin(*at) for at in shifts.items()], "in"),
+        why="but where the thesis's program fails, the mechanism does not fail (row before)",
     )
 
 
 def _inverse_difference(case: Case) -> float:
-    """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections of a turn.
-
-    A^-1 is the pseudo-inverse of A that line L457 defines, here computed from singular values. A first correction is one from
-    the solution at the previous angle.
-    """
+    """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections at the angles of a turn."""
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     start = np.roll(case_turn(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
     loop = chain(parameters(case.offset_in, case.twist_deg), angle, shift, start)
@@ -306,7 +289,7 @@ def _inverse_difference(case: Case) -> float:
     return float(np.abs(delta - np.linalg.pinv(matrix) @ right).max())
 
 
-def _matrices() -> tuple[Statement, ...]:
+def _matrices() -> Iterator[Statement]:
     """Judge the freedoms of the joints, the matrices of eqs 1 to 4, and the operators of eqs 2a to 4a."""
     (turning, sliding), (before, _), (after, _), (_, guided) = _joint_freedoms()
     joints = (
@@ -316,36 +299,34 @@ def _matrices() -> tuple[Statement, ...]:
         ("joint 3, rotations", "three", 3.0, after),
         ("joint 4, translations", "one", 1.0, guided),
     )
-    return (
-        Statement(
-            "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
-            "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
-            "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
-            text("section 2.3, L213; eqs 1 to 4"),
-            "freedoms that the matrices of eqs 1 to 4 give each joint, in a general position. The rotations are the rank of "
-            "the derivatives of the matrix's real part by the joint's variables; the translations are what the dual part "
-            "adds to this rank",
-            "none, since counts are exact",
-            tuple(replace(near(label, count, found, 0.0), stated=word) for label, word, count, found in joints),
-            "erratum 1: eqs 2 and 3 give each ball joint two rotations",
-        ),
-        Statement(
-            "Therefore, the transformation matrix, specifying the location of coordinate frame {2} with respect to frame {1}, "
-            "can be written as",
-            text("section 2.4, eqs 1 to 4, L261-306"),
-            "difference between the matrices of eqs 1 to 4 and the products of the rotations and translations that the text "
-            "names, in a general position, with lengths in inches",
-            ROUNDING,
-            (nothing("eqs 1 to 4", _matrices_error()),),
-        ),
-        Statement(
-            "hence partial differential operator [Q_L eta_2] can be written as,",
-            text("section 2.5, eqs 2a to 4a, L320-352"),
-            "operators times matrices, minus difference quotients of the matrices, in a general position, with lengths "
-            "relative to the rod's length",
-            f"{ROUGH:g}, the error of the difference quotients",
-            (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operator_error()),),
-        ),
+    yield statement(
+        "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
+        "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
+        "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
+        "section 2.3, L213; eqs 1 to 4",
+        "freedoms that the matrices of eqs 1 to 4 give each joint, in a general position. The rotations are the rank of "
+        "the derivatives of the matrix's real part by the joint's variables; the translations are what the dual part "
+        "adds to this rank",
+        "none, since counts are exact",
+        *(replace(near(label, count, found, 0.0), stated=word) for label, word, count, found in joints),
+        why="erratum 1: eqs 2 and 3 give each ball joint two rotations",
+    )
+    yield statement(
+        "Therefore, the transformation matrix, specifying the location of coordinate frame {2} with respect to frame {1}, "
+        "can be written as",
+        "section 2.4, eqs 1 to 4, L261-306",
+        "difference between the matrices of eqs 1 to 4 and the products of the rotations and translations that the text "
+        "names, in a general position, with lengths in inches",
+        ROUNDING,
+        nothing("eqs 1 to 4", _matrices_error()),
+    )
+    yield statement(
+        "hence partial differential operator [Q_L eta_2] can be written as,",
+        "section 2.5, eqs 2a to 4a, L320-352",
+        "operators times matrices, minus difference quotients of the matrices, in a general position, with lengths "
+        "relative to the rod's length",
+        f"{ROUGH:g}, the error of the difference quotients",
+        at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operator_error()),
     )
 
 
@@ -354,60 +335,53 @@ def _combined(case: Case) -> tuple[FloatArray, FloatArray, bool]:
     return close_loop_combined(parameters(case.offset_in, case.twist_deg), case.shift_in)
 
 
-def _step() -> tuple[Statement, ...]:
+def _step() -> Iterator[Statement]:
     """Judge the equations of a step of the iteration, eqs 19a to 23a."""
     rank, order = _independent()
     least = min(float(_combined(case)[0].max()) for case in OPEN)
     half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_solving_22()
     open_deg = np.degrees(Rotation.from_matrix(open_22).magnitude())
-    return (
-        Statement(
-            "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
-            "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
-            "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
-            text("section 2.6.1, L366; abstract, L45"),
-            why="the thesis prints only the Newton-Raphson half (eqs 7 to 26), and its program is missing. When we combine "
-            f"the two in our own way, the loop stays open by {least:.0f} deg or more somewhere in the turn in each of the "
-            f"cases {', '.join(case.name for case in OPEN)}",
-        ),
-        Statement(
-            "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
-            "independent.",
-            text("section 2.6.1, eqs 19a, 19b, L416"),
-            "rank of the nine left sides, by eqs 12 to 16, in a general position. Then the sums of right sides on opposite "
-            "sides of the diagonal, which vanish if three equations imply the other six: the order (power) with which these "
-            "sums decrease as an open planar loop is closed. On the diagonal of 19a, B11^-1 in our scan is read as B11 - 1 by "
-            "eq 19",
-            "none for the rank; order 2, as eq 11 neglects the second order; 0.05, since an order is a whole number",
-            (
-                replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
-                at_least("order of the sums of right sides", 1.95, order),
-            ),
-        ),
-        Statement(
-            "Equation set (20) does not include the constraint that the each diagonal element must be equal to unity at "
-            "closure. This constraint is included through modification of the current set of equations as discussed in Sandor "
-            "and Erdman (1984).",
-            text("section 2.6.1, eqs 20, 22, L429-436"),
-            "right sides of eqs 20 for a loop that is open by half a turn about i. Then, for an open loop for which the "
-            "right sides of eqs 22 vanish, the greatest difference of a diagonal element from unity",
-            ROUNDING,
-            (
-                nothing("not in eqs 20: half a turn", half_turn[_BELOW]),
-                nothing(f"in eqs 22: a loop open by {open_deg:.1f} deg", np.diag(open_22) - 1.0),
-            ),
-            "eqs 22 exclude an opening of half a turn, but not every open loop",
-        ),
-        Statement(
-            "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
-            "A^-1 V].",
-            text("section 2.6.1, eq 23a, L457-463"),
-            "greatest difference of Delta by eq 23a from A^-1 V, with A^-1 (by L457 the pseudo-inverse) from singular values, "
-            f"over the first corrections of a turn; {OPEN[0].name}, lengths in inches",
-            ROUNDING,
-            (nothing("the two sides", _inverse_difference(OPEN[0])),),
-            "A is 6 x 5, so that Delta need not satisfy eq 23 itself",
-        ),
+    yield statement(
+        "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
+        "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
+        "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
+        "section 2.6.1, L366; abstract, L45",
+        why="the thesis prints only the Newton-Raphson half (eqs 7 to 26), and its program is missing. When we combine "
+        f"the two in our own way, the loop stays open by {least:.0f} deg or more somewhere in the turn in each of the "
+        f"cases {', '.join(case.name for case in OPEN)}",
+    )
+    yield statement(
+        "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
+        "independent.",
+        "section 2.6.1, eqs 19a, 19b, L416",
+        "rank of the nine left sides, by eqs 12 to 16, in a general position. Then the sums of right sides on opposite sides "
+        "of the diagonal, which vanish if three equations imply the other six: the order (power) with which these sums "
+        "decrease as an open planar loop is closed. On the diagonal of 19a, B11^-1 in our scan is read as B11 - 1 by eq 19",
+        "none for the rank; order 2, as eq 11 neglects the second order; 0.05, since an order is a whole number",
+        replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
+        at_least("order of the sums of right sides", 1.95, order),
+    )
+    yield statement(
+        "Equation set (20) does not include the constraint that the each diagonal element must be equal to unity at "
+        "closure. This constraint is included through modification of the current set of equations as discussed in Sandor "
+        "and Erdman (1984).",
+        "section 2.6.1, eqs 20, 22, L429-436",
+        "right sides of eqs 20 for a loop that is open by half a turn about i. Then, for an open loop for which the "
+        "right sides of eqs 22 vanish, the greatest difference of a diagonal element from unity",
+        ROUNDING,
+        nothing("not in eqs 20: half a turn", half_turn[_BELOW]),
+        nothing(f"in eqs 22: a loop open by {open_deg:.1f} deg", np.diag(open_22) - 1.0),
+        why="eqs 22 exclude an opening of half a turn, but not every open loop",
+    )
+    yield statement(
+        "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
+        "A^-1 V].",
+        "section 2.6.1, eq 23a, L457-463",
+        "greatest difference of Delta by eq 23a from A^-1 V, with A^-1 (by L457 the pseudo-inverse) from singular values, "
+        f"over the first corrections of a turn; {OPEN[0].name}, lengths in inches",
+        ROUNDING,
+        nothing("the two sides", _inverse_difference(OPEN[0])),
+        why="A is 6 x 5, so that Delta need not satisfy eq 23 itself",
     )
 
 
@@ -419,12 +393,9 @@ def closure() -> StudyResult:
         columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
         columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
         rotation, error, _ = _combined(case)
-        columns[f"rotation left with Davidon Fletcher Powell; {case.name} [deg]"] = np.interp(
-            GRID_DEG, GRID_DEG[::2], rotation
-        )
-        columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(
-            GRID_DEG, GRID_DEG[::2], error
-        )
+        for what, unit, found_there in (("rotation left", "deg", rotation), ("error of S4", "in", error)):
+            name = f"{what} with Davidon Fletcher Powell; {case.name} [{unit}]"
+            columns[name] = np.interp(GRID_DEG, GRID_DEG[::2], found_there)
     return StudyResult(
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
         assignment=f"The iteration goes round the turn in steps of {STEP_DEG:g} deg. It starts from the planar estimate at "

@@ -12,7 +12,7 @@ Statements of sections 3.2 and 3.3 on several figures are judged with the first 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -28,7 +28,7 @@ from ...slider_crank import CLEAR_DEG, ConstantShift, ForceTurn, GrooveShift, co
 from ...units import INCH
 from ..rules import ABOUT, ABOUT_DEG
 from ..statements import Case as Judged
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache, vary
 from .printed import (
@@ -54,8 +54,6 @@ from .table import (
     Case,
     Component,
 )
-
-FloatArray = NDArray[np.float64]
 
 #: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
@@ -147,7 +145,7 @@ def nothing(label: str, size: ArrayLike, unit: str = "", *, why: str = "") -> Ju
     return at_most(label, NOTHING, float(np.max(np.abs(size))), unit, why=why)
 
 
-def _motion() -> tuple[Statement, ...]:
+def _motion() -> Iterator[Statement]:
     """Judge the shape and the stroke of the slider's motion, and the mean power at the crank."""
     shapes = []
     for case in (IDEAL, *ALL):
@@ -163,33 +161,31 @@ def _motion() -> tuple[Statement, ...]:
         "a load of 1 lb against the motion, ours": [2.0 * _stroke(c) * CRANK_SPEED / (2.0 * np.pi) for c in cases],
     }
     saved = [at_least(words, NOTHING, first - min(rest), "lb.in/s") for words, (first, *rest) in power.items()]
-    return (
-        Statement(
-            "Slider displacement curves are almost semi-sinusoidal type of graphs which seem to be quite reasonable.",
-            text("section 3.3, L1125"),
-            "greatest distance of S4 from the sum of its mean and its first harmonic, relative to half the stroke, in Figs "
-            "R5 to R7. *Semi-sinusoidal* is read as sinusoidal; *reasonable* is not measured",
-            f"{ABOUT:g}, the rule for *almost*",
-            tuple(shapes),
-        ),
-        Statement(
-            "When crank is placed at higher level than the plane on which slider is moving by providing positive offset "
-            "distance [a4], the stroke of the engine is reduced.",
-            text("section 3.3, L1125"),
-            "stroke of each case of variable offset, relative to the stroke of the ideal case",
-            "none, the sign decides",
-            tuple(strokes),
-            "the offset lengthens the stroke; it does so at S1 = 0 as well",
-        ),
-        Statement(
-            "So in that case [of a positive a4], while consuming less power the same RPM of the engine can be obtained.",
-            text("section 3.3, L1125"),
-            "mean power at 50 rpm in the ideal case, minus the least mean power at a4 = 10, 20, 30 in with S1 = 3.5 in",
-            f"more than {NOTHING:g} lb.in/s, for rounding errors",
-            tuple(saved),
-            "at this speed the given torque takes the same power at any offset; a given load takes more, because the stroke "
-            "is longer",
-        ),
+    yield statement(
+        "Slider displacement curves are almost semi-sinusoidal type of graphs which seem to be quite reasonable.",
+        "section 3.3, L1125",
+        "greatest distance of S4 from the sum of its mean and its first harmonic, relative to half the stroke, in Figs "
+        "R5 to R7. *Semi-sinusoidal* is read as sinusoidal; *reasonable* is not measured",
+        f"{ABOUT:g}, the rule for *almost*",
+        *shapes,
+    )
+    yield statement(
+        "When crank is placed at higher level than the plane on which slider is moving by providing positive offset "
+        "distance [a4], the stroke of the engine is reduced.",
+        "section 3.3, L1125",
+        "stroke of each case of variable offset, relative to the stroke of the ideal case",
+        "none, the sign decides",
+        *strokes,
+        why="the offset lengthens the stroke; it does so at S1 = 0 as well",
+    )
+    yield statement(
+        "So in that case [of a positive a4], while consuming less power the same RPM of the engine can be obtained.",
+        "section 3.3, L1125",
+        "mean power at 50 rpm in the ideal case, minus the least mean power at a4 = 10, 20, 30 in with S1 = 3.5 in",
+        f"more than {NOTHING:g} lb.in/s, for rounding errors",
+        *saved,
+        why="at this speed the given torque takes the same power at any offset; a given load takes more, because the stroke "
+        "is longer",
     )
 
 
@@ -204,7 +200,7 @@ def _stroke(case: Case) -> float:
     return whole.stroke / INCH
 
 
-def _forces() -> tuple[Statement, ...]:
+def _forces() -> Iterator[Statement]:
     """Judge how the forces grow with the offset, and their spikes at the dead centres."""
     components = [COMPONENTS[symbol] for symbol in QUANTITIES[1:]]
     gains, spikes = [], []
@@ -218,45 +214,43 @@ def _forces() -> tuple[Statement, ...]:
     for case in ALL:
         away = float(np.abs(dead_centres_deg(case) - SPIKES_DEG).max())
         spikes.append(at_most(f"{full_name(case)}: distance from 100 and 300 deg", ABOUT_DEG, away, "deg"))
-    return (
-        Statement(
-            "But with the increase of offset distance [a4], joint forces and torques also increase.",
-            text("section 3.3, L1125"),
-            "change of a component's greatest magnitude from each case to the next: the ideal case, then a4 = 10, 20, 30 in "
-            f"with S1 = 3.5 in. The magnitude is taken {FROM_DEAD}, our choice. For each of the eleven components in the "
-            "graphs, the least of the three changes is listed",
-            "none, the sign decides",
-            tuple(gains),
-            "the other components decrease at one step at least. If the distance from the dead centres is 3, 5, 15, 20 or "
-            "30 deg instead, two or three components increase",
-        ),
-        Statement(
-            "So proper design is necessary for the safe operation of the engine, considering that factor [the increase of "
-            "forces and torques].",
-            text("section 3.3, L1125"),
-            why="advice, not a finding",
-        ),
-        Statement(
-            "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
-            "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
-            text("section 3.3, L1125"),
-            "number of poles (spikes) of each component in a turn, in the nine cases other than the ideal one, except where "
-            "the component vanishes; the number that differs most from the stated one is listed. Then, for each case, the "
-            "greatest distance of its dead centres, where the poles lie, from 100 and 300 deg",
-            f"none for a number of spikes; {ABOUT_DEG:g} deg, the rule for *near*",
-            tuple(spikes),
-            "3F3k is finite at both dead centres, and 4F4k at neither. The offset and the twist move the dead centres",
-        ),
-        Statement(
-            "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "
-            "the links at high speed is very large.",
-            text("section 3.3, L1125"),
-            why="the thesis gives neither a strength nor a number of cycles",
-        ),
+    yield statement(
+        "But with the increase of offset distance [a4], joint forces and torques also increase.",
+        "section 3.3, L1125",
+        "change of a component's greatest magnitude from each case to the next: the ideal case, then a4 = 10, 20, 30 in "
+        f"with S1 = 3.5 in. The magnitude is taken {FROM_DEAD}, our choice. For each of the eleven components in the "
+        "graphs, the least of the three changes is listed",
+        "none, the sign decides",
+        *gains,
+        why="the other components decrease at one step at least. If the distance from the dead centres is 3, 5, 15, 20 or "
+        "30 deg instead, two or three components increase",
+    )
+    yield statement(
+        "So proper design is necessary for the safe operation of the engine, considering that factor [the increase of "
+        "forces and torques].",
+        "section 3.3, L1125",
+        why="advice, not a finding",
+    )
+    yield statement(
+        "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
+        "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
+        "section 3.3, L1125",
+        "number of poles (spikes) of each component in a turn, in the nine cases other than the ideal one, except where "
+        "the component vanishes; the number that differs most from the stated one is listed. Then, for each case, the "
+        "greatest distance of its dead centres, where the poles lie, from 100 and 300 deg",
+        f"none for a number of spikes; {ABOUT_DEG:g} deg, the rule for *near*",
+        *spikes,
+        why="3F3k is finite at both dead centres, and 4F4k at neither. The offset and the twist move the dead centres",
+    )
+    yield statement(
+        "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "
+        "the links at high speed is very large.",
+        "section 3.3, L1125",
+        why="the thesis gives neither a strength nor a number of cycles",
     )
 
 
-def _bearing_moments() -> tuple[Statement, ...]:
+def _bearing_moments() -> Iterator[Statement]:
     """Judge whether the shift causes the moments 1T1i and 1T1j, and how they follow from the forces on the crank."""
     cases = (IDEAL, *ALL)
     moments = {symbol: {case: values(case, COMPONENTS[symbol]) for case in cases} for symbol in ("1T1i", "1T1j")}
@@ -286,42 +280,40 @@ def _bearing_moments() -> tuple[Statement, ...]:
         at_least(symbol, NOTHING, min(greatest(c, sizes[c]) for c in shifted), "lb.in")
         for symbol, sizes in moments.items()
     ]
-    return (
-        Statement(
-            "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint [1].",
-            text("section 3.3, L1125-1127"),
-            f"greatest magnitude {FROM_DEAD}, in each of the six cases with a shift; the least of the six is listed",
-            f"more than {ROUNDING}",
-            tuple(extra),
-        ),
-        Statement(
-            "So extra precaution should be taken by designer, so that engine does not fail, and the manufacturer should pay "
-            "special attention to minimize this tolerance error [of S1].",
-            text("section 3.3, L1127"),
-            why="advice, not a finding",
-        ),
-        Statement(
-            "Two torque components at joint [1], i.e. [1T1i] and [1T1j] reduce to zero, when there is no crank axial offset "
-            "[S1].",
-            text("section 3.2, L1119"),
-            f"greatest magnitude {FROM_DEAD}, in the ideal case and in the three cases with S1 = 0, a4 = 20 in",
-            ROUNDING,
-            tuple(none),
-            "with a twist, the axial force 1F1k has a lever arm about the bearing",
-        ),
-        Statement(
-            "By manual manipulation it is found that [1T1i = -1F1j S1] and [1T1j = 1F1i S1].",
-            text("section 3.2, L1119"),
-            "difference of the two sides of each equation: first by the printed eqs 69p and 69q, in a general position at a "
-            f"constant shift; then by the right forces, the greatest of the six cases with a shift, {FROM_DEAD}",
-            ROUNDING,
-            (*by_hand, *by_forces),
-            "the thesis sets 1F1k to zero, but the right 1F1k (erratum 7) adds to both moments",
-        ),
+    yield statement(
+        "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint [1].",
+        "section 3.3, L1125-1127",
+        f"greatest magnitude {FROM_DEAD}, in each of the six cases with a shift; the least of the six is listed",
+        f"more than {ROUNDING}",
+        *extra,
+    )
+    yield statement(
+        "So extra precaution should be taken by designer, so that engine does not fail, and the manufacturer should pay "
+        "special attention to minimize this tolerance error [of S1].",
+        "section 3.3, L1127",
+        why="advice, not a finding",
+    )
+    yield statement(
+        "Two torque components at joint [1], i.e. [1T1i] and [1T1j] reduce to zero, when there is no crank axial offset [S1].",
+        "section 3.2, L1119",
+        f"greatest magnitude {FROM_DEAD}, in the ideal case and in the three cases with S1 = 0, a4 = 20 in",
+        ROUNDING,
+        *none,
+        why="with a twist, the axial force 1F1k has a lever arm about the bearing",
+    )
+    yield statement(
+        "By manual manipulation it is found that [1T1i = -1F1j S1] and [1T1j = 1F1i S1].",
+        "section 3.2, L1119",
+        "difference of the two sides of each equation: first by the printed eqs 69p and 69q, in a general position at a "
+        f"constant shift; then by the right forces, the greatest of the six cases with a shift, {FROM_DEAD}",
+        ROUNDING,
+        *by_hand,
+        *by_forces,
+        why="the thesis sets 1F1k to zero, but the right 1F1k (erratum 7) adds to both moments",
     )
 
 
-def _constant() -> tuple[Statement, ...]:
+def _constant() -> Iterator[Statement]:
     """Judge the components that section 3.2 finds constant or zero, and the axial force."""
     size = {
         symbol: {case: greatest(case, values(case, COMPONENTS[symbol])) for case in ALL} for symbol in ("1F1k", "2F2k")
@@ -331,61 +323,52 @@ def _constant() -> tuple[Statement, ...]:
     }
     pins = [values(case, COMPONENTS["2F2j"]) for case in ALL]
     equations = _equations()
-    return (
-        Statement(
-            "All the torque components at joint 4, i.e. [4T4i], [4T4j], and [4T4k] and the force components along joint axis "
-            "(k) at joint 2, i.e. [2F2k] are found to be zero throughout one complete revolution of the crank at any offset.",
-            text("section 3.2, L1117"),
-            f"greatest magnitude, of 4T4 in all cases, of 2F2k {FROM_DEAD}",
-            ROUNDING,
-            (
-                *(nothing(symbol, moment, "lb.in") for symbol, moment in guide.items()),
-                *(nothing(f"2F2k; {full_name(case)}", pin, "lb") for case, pin in size["2F2k"].items()),
-            ),
-            "4T4 is zero since the slider's centre of mass is in its pin; 2F2k is zero in the plane alone",
+    yield statement(
+        "All the torque components at joint 4, i.e. [4T4i], [4T4j], and [4T4k] and the force components along joint axis "
+        "(k) at joint 2, i.e. [2F2k] are found to be zero throughout one complete revolution of the crank at any offset.",
+        "section 3.2, L1117",
+        f"greatest magnitude, of 4T4 in all cases, of 2F2k {FROM_DEAD}",
+        ROUNDING,
+        *(nothing(symbol, moment, "lb.in") for symbol, moment in guide.items()),
+        *(nothing(f"2F2k; {full_name(case)}", pin, "lb") for case, pin in size["2F2k"].items()),
+        why="4T4 is zero since the slider's centre of mass is in its pin; 2F2k is zero in the plane alone",
+    )
+    yield statement(
+        "Another force component along the j-axis of joint 2, i.e. [2F2j] is constant (-8.33 lbs) throughout one complete "
+        "rotation of the crank at any offset.",
+        "section 3.2, L1117-1119",
+        "least and greatest value of the nine cases",
+        "0.005 lb, half a unit of the last digit",
+        *(
+            near(which, "-8.33", pick([pick(pin) for pin in pins]), unit="lb")
+            for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
         ),
-        Statement(
-            "Another force component along the j-axis of joint 2, i.e. [2F2j] is constant (-8.33 lbs) throughout one complete "
-            "rotation of the crank at any offset.",
-            text("section 3.2, L1117-1119"),
-            "least and greatest value of the nine cases",
-            "0.005 lb, half a unit of the last digit",
-            tuple(
-                near(which, "-8.33", pick([pick(pin) for pin in pins]), unit="lb")
-                for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
-            ),
-        ),
-        Statement(
-            "Axial force [1F1k] acts on the crank at joint 1 and equals mass of the crank times its axial acceleration, and "
-            "torque [1T1k] is applied constantly.",
-            text("section 2.8, L945"),
-            f"greatest difference of the axial force from m1 S1'', {FROM_DEAD}: in the nine cases of constant shift, and "
-            "with a sinusoidal shift by eq 28, of which amplitude and alpha are our choice; its dead centres are where S4 at a "
-            "constant S1 turns back",
-            ROUNDING,
-            (
-                *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),
-                nothing("a4 = 10 in, sinusoidal shift of 3.5 in, alpha = 1", sinusoidal_axial_force(), "lb"),
-            ),
-            "erratum 7: S1 is given, so that the axial force is an unknown. The constant torque is an assumption, which is "
-            "not judged",
-        ),
-        Statement(
-            "There are sixteen unknowns, including both forces and torques and seventeen equations. Although one equation is "
-            "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
-            "possible, because small sine or cosine terms in the denominator sometimes results in inaccurate division.",
-            text("section 2.8, L961"),
-            "number of unknown components of the joint forces and moments, including 1F1k; number of eqs 62a to "
-            "64f without 63b and with 62c mended; their rank in these unknowns in a general position, which is 16 if one "
-            "equation is redundant",
-            "none, since counts are exact",
-            (
-                replace(near("unknowns", 16.0, len(COMPONENTS) - 1, 0.0), stated="sixteen"),
-                replace(near("equations", 17.0, len(equations), 0.0), stated="seventeen"),
-                near("rank", 16.0, np.linalg.matrix_rank(equations), 0.0),
-            ),
-            "erratum 7: with 1F1k unknown, no equation is redundant. The remark on sines and cosines is not measured",
-        ),
+    )
+    yield statement(
+        "Axial force [1F1k] acts on the crank at joint 1 and equals mass of the crank times its axial acceleration, and "
+        "torque [1T1k] is applied constantly.",
+        "section 2.8, L945",
+        f"greatest difference of the axial force from m1 S1'', {FROM_DEAD}: in the nine cases of constant shift, and "
+        "with a sinusoidal shift by eq 28, of which amplitude and alpha are our choice; its dead centres are where S4 at a "
+        "constant S1 turns back",
+        ROUNDING,
+        *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),
+        nothing("a4 = 10 in, sinusoidal shift of 3.5 in, alpha = 1", sinusoidal_axial_force(), "lb"),
+        why="erratum 7: S1 is given, so that the axial force is an unknown. The constant torque is an assumption, which is "
+        "not judged",
+    )
+    yield statement(
+        "There are sixteen unknowns, including both forces and torques and seventeen equations. Although one equation is "
+        "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
+        "possible, because small sine or cosine terms in the denominator sometimes results in inaccurate division.",
+        "section 2.8, L961",
+        "number of unknown components of the joint forces and moments, including 1F1k; number of eqs 62a to 64f without 63b "
+        "and with 62c mended; their rank in these unknowns in a general position, which is 16 if one equation is redundant",
+        "none, since counts are exact",
+        replace(near("unknowns", 16.0, len(COMPONENTS) - 1, 0.0), stated="sixteen"),
+        replace(near("equations", 17.0, len(equations), 0.0), stated="seventeen"),
+        near("rank", 16.0, np.linalg.matrix_rank(equations), 0.0),
+        why="erratum 7: with 1F1k unknown, no equation is redundant. The remark on sines and cosines is not measured",
     )
 
 
@@ -451,16 +434,13 @@ def compute(number: str) -> StudyResult:
         claim=claim,
         assignment=assignment,
         columns=pad_columns(columns),
-        statements=_JUDGED[number]() if number in _JUDGED else (),
+        statements=tuple(_JUDGED[number]()) if number in _JUDGED else (),
         see="" if number in ("R5", "R8", CONSTANT) else _judging_figures(number, symbols),
     )
 
 
 def _judging_figures(number: str, symbols: tuple[str, ...]) -> str:
-    """Return the numbers of the figures whose statements are also about this figure.
-
-    ``symbols`` are the components that this figure shows.
-    """
+    """Return the numbers of the figures that judge this figure, which shows the components ``symbols``, too."""
     if not symbols:
         return "R5"
     return "R8" if "T" not in symbols[0] else "R8 and below" if number in _JUDGED else "R8 and R14"

@@ -7,7 +7,7 @@ quotients, and the model by Newton's and Euler's equations. The errata are numbe
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from linkwork.slider_crank.published import parameters
 
@@ -15,13 +15,12 @@ from ...figures import Curve, Figure, Panel, plot_curves
 from ...numerics.dual import Dual, about_i, about_j, about_k
 from ..rules import ABOUT_DEG
 from ..statements import Case as Judged
+from ..statements import FloatArray, unjudged
 from ..study import StudyResult
 from ..variation import cache
 from .figures import ALL, ANGLE, clear_mask, printed, printed_symbol
 from .printed import CRANK_AT_SPEED, GENERAL, STEP, Joints, Turn, turn
 from .table import IDEAL, Case
-
-FloatArray = NDArray[np.float64]
 
 #: Length of the rod (in).
 ROD = CRANK_AT_SPEED.a2
@@ -80,13 +79,10 @@ def difference(a: Dual, b: Dual) -> float:
 
 
 def unsure(label: str, slip: str, size: ArrayLike, unit: str) -> Judged:
-    """Return a case that cannot be judged, because our scan alone may have a wrong symbol in an equation.
-
-    ``slip`` names the wrong and the right symbol, ``size`` is the difference between their results.
-    """
+    """Return an unjudged case: our scan alone may have the ``slip``, whose result differs by ``size`` from the right one's."""
     most = float(np.max(np.abs(size)))
     why = f"our scan has {slip}, a difference of {most:.4g} {unit}; the printed thesis may be right (erratum 9)"
-    return Judged(label=label, computed=None, why=why)
+    return unjudged(label, why)
 
 
 #: Labels of the axes by the unit of their columns.

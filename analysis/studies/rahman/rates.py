@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from linkwork.slider_crank.published import CRANK_SPEED, parameters
@@ -11,7 +13,7 @@ from ...slider_crank import settle
 from ...slider_crank.closure import planar
 from ...units import INCH
 from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 from ..variation import ignore_changes
 from . import method, printed
@@ -19,11 +21,8 @@ from .figures import ANGLE, ANGLES_DEG, NOTHING, OFFSETS, ROUNDING, dead_centres
 from .table import IDEAL, SPIKES_DEG, Case
 
 
-def row_f(case: Case) -> tuple[method.FloatArray, method.FloatArray]:
-    """Return the residuals of eq 37f (in/s): as printed, NaN where eq 41 is unbounded, and with erratum 2 mended.
-
-    Each residual has a value at every angle of the turn.
-    """
+def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return eq 37f's residuals (in/s) over the turn: as printed, NaN where eq 41 is unbounded, and with erratum 2 mended."""
     p, q = parameters(case.offset_in, case.twist_deg), method.joints(method.case_turn(case).unknowns[:, 0])
     lacking = printed.loop_rates(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))[5]
     shift = np.full(printed.GRID_DEG.size, case.shift_in * INCH)
@@ -42,10 +41,7 @@ def _angular_velocity() -> float:
 
 
 def _velocities() -> dict[str, float]:
-    """Return the errors of eqs 33, 35, 36 and 45, by equation, compared with velocities transformed by matrices.
-
-    The matrices are those of eqs 1 to 3, the velocities those of eqs 29 to 32.
-    """
+    """Return the errors of eqs 33, 35, 36 and 45 by name, against eqs 29 to 32 transformed by the matrices of eqs 1 to 3."""
     r, (crank, rod, slider) = printed.joint_rates(method.MOVING, printed.GENERAL), method.links()
     of_crank, of_rod, _ = printed.velocities(method.MOVING, printed.GENERAL, r)
     forward = printed.forward_rod_velocity(method.MOVING, printed.GENERAL, r)
@@ -63,10 +59,7 @@ def _velocities() -> dict[str, float]:
 
 
 def _sinusoidal() -> tuple[float, float]:
-    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = 2.
-
-    Eq 28a should be the rate of eq 28, and eq 28b the rate of eq 28a with its amplitude mended.
-    """
+    """Return the errors of eq 28a (in/s) as eq 28's rate, and of eq 28b (in/s2) as the mended 28a's, at alpha = 2."""
     ratio, amplitude, angle, speed, acceleration, h = 2.0, 2.0, method.AT, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
@@ -79,39 +72,37 @@ def _sinusoidal() -> tuple[float, float]:
     return float(printed_rate - shift.imag / h), float(printed_second - rate.imag / h)
 
 
-def _rows(crank: printed.Crank, q: printed.Joints) -> tuple[method.FloatArray, method.FloatArray]:
+def _rows(crank: printed.Crank, q: printed.Joints) -> tuple[FloatArray, FloatArray]:
     """Return the coefficients of the joint rates in eqs 37a to 37f, shape (6, 5), and the constant terms, shape (6,)."""
     right = printed.loop_rates(crank, q, printed.Joints(*np.zeros(5)))
     return np.stack([printed.loop_rates(crank, q, printed.Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
 
-def _frame_velocities() -> tuple[Statement, ...]:
+def _frame_velocities() -> Iterator[Statement]:
     """Judge the velocities of eqs 30 to 36, 44 and 45."""
-    return (
-        Statement(
-            "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
-            "respectively.",
-            text("section 2.7, eqs 30, 31, L503-509"),
-            "angular velocity by eq 30 (eq 31 has the same form) minus that of the matrix Z(theta) Y(eta) of eq 2, at theta "
-            "= 0.8 rad, eta = 0.3 rad, with rates of 1.7 and -2.1 rad/s",
-            ROUNDING,
-            (nothing("angular velocity", _angular_velocity(), "rad/s"),),
-            "erratum 2: eta turns about the axis j after theta has turned this axis",
-        ),
-        Statement(
-            "The dual velocity of point 3 on the connecting rod relative to the frame in terms of the unit vectors of the "
-            "system {3} is determined by using this equation [34] and the transpose of equation (2):",
-            text("section 2.7, eqs 33 to 36, 44, 45, L515-537, L587-591"),
-            "difference from the matrices of eqs 1 to 3, or their transposes, times the velocities of eqs 29 to 32 and 31a, "
-            "32a, added as the thesis says, in a general position with S1' = 1.3 in/s",
-            ROUNDING,
-            tuple(nothing(label, size, "in/s") for label, size in _velocities().items()),
-            "with the velocities of eqs 30 and 31, which have erratum 2",
-        ),
+    yield statement(
+        "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
+        "respectively.",
+        "section 2.7, eqs 30, 31, L503-509",
+        "angular velocity by eq 30 (eq 31 has the same form) minus that of the matrix Z(theta) Y(eta) of eq 2, at theta "
+        "= 0.8 rad, eta = 0.3 rad, with rates of 1.7 and -2.1 rad/s",
+        ROUNDING,
+        nothing("angular velocity", _angular_velocity(), "rad/s"),
+        why="erratum 2: eta turns about the axis j after theta has turned this axis",
+    )
+    yield statement(
+        "The dual velocity of point 3 on the connecting rod relative to the frame in terms of the unit vectors of the "
+        "system {3} is determined by using this equation [34] and the transpose of equation (2):",
+        "section 2.7, eqs 33 to 36, 44, 45, L515-537, L587-591",
+        "difference from the matrices of eqs 1 to 3, or their transposes, times the velocities of eqs 29 to 32 and 31a, "
+        "32a, added as the thesis says, in a general position with S1' = 1.3 in/s",
+        ROUNDING,
+        *(nothing(label, size, "in/s") for label, size in _velocities().items()),
+        why="with the velocities of eqs 30 and 31, which have erratum 2",
     )
 
 
-def _solved() -> tuple[Statement, ...]:
+def _solved() -> Iterator[Statement]:
     """Judge eqs 38 to 43 by comparison with eqs 37a to 37f, in a general position with the shift in motion."""
     matrix, right = _rows(method.MOVING, printed.GENERAL)
     found = printed.joint_rates(method.MOVING, printed.GENERAL)
@@ -125,88 +116,72 @@ def _solved() -> tuple[Statement, ...]:
             np.linalg.solve(matrix[:5], -right[:5]),
         )
     ]
-    return (
-        Statement(
-            "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
-            "matrices must be equal to some column matrix as shown below:",
-            text("section 2.7, eq 38, L559-561"),
-            "coefficients and right side of eq 38 minus those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
-            ROUNDING,
-            (
-                nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
-                method.unsure("right side of row 6", "sin theta2 for sin theta2 sin eta2", eq_38[5, 5], "in/s"),
-            ),
-        ),
-        Statement(
-            "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
-            text("section 2.7, L563"),
-            "rank of the coefficients of eqs 37a to 37f without and with the right side, in a general position with S1' = "
-            "1.3 in/s; a solution exists only if the two ranks are equal",
-            "none, since counts are exact",
-            (
-                near("coefficients", "5", np.linalg.matrix_rank(matrix), 0.0),
-                near(
-                    "coefficients with the right side",
-                    5.0,
-                    np.linalg.matrix_rank(np.column_stack([matrix, right])),
-                    0.0,
-                ),
-            ),
-            "erratum 3: there are six equations for five unknowns, and only five of them are solved",
-        ),
-        Statement(
-            "The final solutions for all the unknowns are as follows:",
-            text("section 2.7, eqs 39 to 43, L563-573"),
-            "difference from the solution of eqs 37a to 37e, and what remains of eq 37f, in a general position with S1' = 1.3 "
+    yield statement(
+        "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
+        "matrices must be equal to some column matrix as shown below:",
+        "section 2.7, eq 38, L559-561",
+        "coefficients and right side of eq 38 minus those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
+        ROUNDING,
+        nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
+        method.unsure("right side of row 6", "sin theta2 for sin theta2 sin eta2", eq_38[5, 5], "in/s"),
+    )
+    yield statement(
+        "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
+        "section 2.7, L563",
+        "rank of the coefficients of eqs 37a to 37f without and with the right side, in a general position with S1' = "
+        "1.3 in/s; a solution exists only if the two ranks are equal",
+        "none, since counts are exact",
+        near("coefficients", "5", np.linalg.matrix_rank(matrix), 0.0),
+        near("coefficients with the right side", 5.0, np.linalg.matrix_rank(np.column_stack([matrix, right])), 0.0),
+        why="erratum 3: there are six equations for five unknowns, and only five of them are solved",
+    )
+    yield statement(
+        "The final solutions for all the unknowns are as follows:",
+        "section 2.7, eqs 39 to 43, L563-573",
+        "difference from the solution of eqs 37a to 37e, and what remains of eq 37f, in a general position with S1' = 1.3 in/s",
+        ROUNDING,
+        *errors,
+        nothing(
+            "row 37f",
+            printed.loop_rates(method.MOVING, printed.GENERAL, found)[5],
             "in/s",
-            ROUNDING,
-            (
-                *errors,
-                nothing(
-                    "row 37f",
-                    printed.loop_rates(method.MOVING, printed.GENERAL, found)[5],
-                    "in/s",
-                    why="erratum 3: it is left unsolved",
-                ),
-            ),
+            why="erratum 3: it is left unsolved",
         ),
     )
 
 
-def _derivatives() -> tuple[Statement, ...]:
+def _derivatives() -> Iterator[Statement]:
     """Judge eqs 28a, 28b and 38a to 42a as derivatives."""
     of_28a, of_28b = _sinusoidal()
     found = printed.joint_rates(method.MOVING, printed.GENERAL)
     seconds = printed.joint_accelerations(method.MOVING, printed.GENERAL, found)
     quicker, moved, _ = printed.state_later(method.MOVING, printed.GENERAL, found, seconds)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, printed.joint_rates(quicker, moved)))
-    return (
-        Statement(
-            "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
-            text("section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of"),
-            "S1' by eq 28a minus the rate of eq 28, at theta1 = 0.9 rad with alpha = 2, an amplitude of 2 in and the "
-            "50 rpm of L1075",
-            ROUNDING,
-            (method.unsure("eq 28a", "S1 for its amplitude S_S1", of_28a, "in/s"),),
-        ),
-        Statement(
-            "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
-            text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
-            "S1'' by eq 28b minus the rate of eq 28a with its amplitude mended, at the values of the row before, with a "
-            "crank acceleration of 3 rad/s2",
-            ROUNDING,
-            (nothing("eq 28b", of_28b, "in/s2"),),
-        ),
-        Statement(
-            "Equations (69a) through (69q) involve acceleration terms which are obtained by differentiating "
-            "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
-            text("section 2.8, eqs 38a to 42a, L1035-1045"),
-            "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
-            f"{method.AT_RATES}; {method.DOTS}",
-            ROUNDING,
-            (nothing("eqs 38a to 42a", rough, "rad/s2 or in/s2"),),
-            "38a is the rate of eq 39 as printed and has its erratum 4",
-        ),
+    yield statement(
+        "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
+        "section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of",
+        "S1' by eq 28a minus the rate of eq 28, at theta1 = 0.9 rad with alpha = 2, an amplitude of 2 in and the "
+        "50 rpm of L1075",
+        ROUNDING,
+        method.unsure("eq 28a", "S1 for its amplitude S_S1", of_28a, "in/s"),
+    )
+    yield statement(
+        "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
+        "section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of",
+        "S1'' by eq 28b minus the rate of eq 28a with its amplitude mended, at the values of the row before, with a "
+        "crank acceleration of 3 rad/s2",
+        ROUNDING,
+        nothing("eq 28b", of_28b, "in/s2"),
+    )
+    yield statement(
+        "Equations (69a) through (69q) involve acceleration terms which are obtained by differentiating "
+        "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
+        "section 2.8, eqs 38a to 42a, L1035-1045",
+        "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
+        f"{method.AT_RATES}; {method.DOTS}",
+        ROUNDING,
+        nothing("eqs 38a to 42a", rough, "rad/s2 or in/s2"),
+        why="38a is the rate of eq 39 as printed and has its erratum 4",
     )
 
 
@@ -222,11 +197,8 @@ EQUATIONS = {
 }
 
 
-def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: method.FloatArray) -> dict[str, float]:
-    """Return the greatest second rate of each joint within 10 deg of a dead centre, relative to the greatest elsewhere.
-
-    The second rates are those of eqs 38a to 42a.
-    """
+def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: FloatArray) -> dict[str, float]:
+    """Return each joint's greatest second rate, eqs 38a to 42a, within 10 deg of a dead centre over the greatest elsewhere."""
     found = printed.joint_accelerations(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))
     is_close = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
@@ -235,7 +207,7 @@ def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: method.FloatAr
     }
 
 
-def _iteration_end(case: Case, angles_deg: method.FloatArray, start: method.FloatArray) -> method.FloatArray:
+def _iteration_end(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
     """Return the unknowns (n, 5) at the end of the printed iteration at n crank angles, given a start for each angle."""
     p, unit = parameters(case.offset_in, case.twist_deg), [1.0, 1.0, 1.0, 1.0, INCH]
     shift = case.shift_in * INCH
@@ -243,18 +215,7 @@ def _iteration_end(case: Case, angles_deg: method.FloatArray, start: method.Floa
     return np.asarray(ended.unknowns / unit)
 
 
-def _iteration_end_on_turn(case: Case) -> method.FloatArray:
-    """Return the unknowns at the end of the printed iteration at every half degree of a turn.
-
-    The iteration starts from the solution at the last multiple of five degrees.
-    """
-    starts = np.repeat(method.case_turn(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
-    return _iteration_end(case, ANGLES_DEG[:-1], starts)
-
-
-def _zeros(
-    case: Case, angles_deg: method.FloatArray, unknowns: method.FloatArray
-) -> tuple[method.FloatArray, method.FloatArray]:
+def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles (deg) at which sin theta2 is zero in the printed iteration's results, and the unknowns there."""
     sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
     small = np.abs(sine) < method.CLEAR_SINE
@@ -267,20 +228,8 @@ def _zeros(
     return zeros, start
 
 
-def _beside_zeros(
-    case: Case, angles_deg: method.FloatArray, unknowns: method.FloatArray
-) -> tuple[method.FloatArray, method.FloatArray]:
-    """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
-    zeros, start = _zeros(case, angles_deg, unknowns)
-    beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
-    return beside, _iteration_end(case, beside, np.tile(start, (2, 1)))
-
-
 def _roundoff(q: printed.Joints) -> float:
-    """Return the greatest roundoff error of eqs 38a to 42a, relative to the greatest acceleration by the same equation.
-
-    ``q`` are the joint values.
-    """
+    """Return the greatest roundoff by eqs 38a to 42a at joint values q, relative to the equation's greatest acceleration."""
     digit = np.spacing(2.0 * np.pi)
     short, long = (
         printed.joint_accelerations(printed.CRANK_AT_SPEED, at, printed.joint_rates(printed.CRANK_AT_SPEED, at))
@@ -298,22 +247,20 @@ def _denominators() -> Statement:
         for which, stated, at in zip(("first", "second"), ("100", "300"), dead_centres_deg(case))
     ]
     sines = [np.sin(planar(parameters(case.offset_in), np.radians(ANGLES_DEG))[:, 2]) for case in planes]
-    return Statement(
+    return statement(
         "Although all the dynamic equations ((68a) through (68g) and (68i) through (68q)) are free from sine or "
         "cosine terms in the denominator, the expressions for acceleration (equation (38a) through (42a)) are "
         "not free from sine terms which become very very close to zero at some particular positions of the "
         "crank, i.e. near 100 degrees and 300 degrees.",
-        text("section 3.2, L1115"),
+        "section 3.2, L1115",
         "number of sines and cosines in the denominators of the equations printed as 69a to 69g and 69i to 69q. Then, in "
         "the plane, the crank angles at which sin theta2, a divisor in 40a and 41a, vanishes. Then the least distance of "
         "theta3, whose sine is a divisor in all five, from 0 or half a turn, over the whole turn in the plane",
         f"none for a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
-        (
-            near("sines and cosines in denominators", 0.0, 0, 0.0),
-            *zeros,
-            at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(np.abs(sines).min())), "deg"),
-        ),
-        "theta2 is 0 or half a turn at the dead centres, and the offset moves the dead centres. The only divisor "
+        near("sines and cosines in denominators", 0.0, 0, 0.0),
+        *zeros,
+        at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(np.abs(sines).min())), "deg"),
+        why="theta2 is 0 or half a turn at the dead centres, and the offset moves the dead centres. The only divisor "
         "printed in 38a, 39a and 42a is sin theta3, which is never close to zero",
     )
 
@@ -321,16 +268,20 @@ def _denominators() -> Statement:
 def _abnormal() -> Statement:
     """Judge the cause that section 3.2 gives for the spikes, in the case whose dead centres lie near 100 and 300 deg."""
     case, angles = OFFSETS[1], ANGLES_DEG[:-1]
-    unknowns = _iteration_end_on_turn(case)
-    beside, closest = _beside_zeros(case, angles, unknowns)
+    # each half degree from the solution at the last multiple of 5 deg
+    starts = np.repeat(method.case_turn(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
+    unknowns = _iteration_end(case, angles, starts)
+    zeros, start = _zeros(case, angles, unknowns)
+    beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
+    closest = _iteration_end(case, beside, np.tile(start, (2, 1)))
     ratios = _near_dead_centres(case, method.joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
     th2 = np.abs((np.degrees(closest[: closest.shape[0] // 2, 0]) + 180.0) % 360.0 - 180.0)
-    return Statement(
+    return statement(
         "Using the computer program it has been observed that near those particular values for input crank "
         "angle, the joint angle [theta2] goes very close to zero degrees and thus the calculated values of the "
         "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
         "the computer calculations, which is clearly inaccurate.",
-        text("section 3.2, L1115"),
+        "section 3.2, L1115",
         f"{full_name(case)}, where the printed iteration ends. First theta2 at {BESIDE_DEG:g} deg (our choice) before the "
         f"angles at which its sine vanishes. Then the greatest acceleration within {ABOUT_DEG:g} deg of a dead centre, "
         f"relative to the greatest elsewhere, at every half degree and at {BESIDE_DEG:g} deg before and after those angles. "
@@ -338,12 +289,10 @@ def _abnormal() -> Statement:
         "acceleration by the same equation",
         f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; a share of one "
         "half, our choice, for *on account of*",
-        (
-            *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
-            *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
-            at_least("share that is roundoff", 0.5, _roundoff(method.joints(unknowns))),
-        ),
-        "38a, 40a and 41a are unbounded because eqs 41 and 42 divide by sin theta2; roundoff is not the cause",
+        *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
+        *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
+        at_least("share that is roundoff", 0.5, _roundoff(method.joints(unknowns))),
+        why="38a, 40a and 41a are unbounded because eqs 41 and 42 divide by sin theta2; roundoff is not the cause",
     )
 
 

@@ -7,13 +7,13 @@ are those of zeta = u/l4. The spring with the mass m4 + m5 alone has the natural
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise, product
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
@@ -29,10 +29,9 @@ from ...youssef import (
     nonlinear_harmonic_balance,
     resonance,
     slider_equation,
-    two_harmonics,
 )
 from ..rules import ABOUT, ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, listing, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, listing, near, statement, unjudged
 from ..study import Study, StudyResult
 from .runs import ALIKE_WORDS, SIGN
 
@@ -70,36 +69,30 @@ DAMPED_RATIOS = (1.0, 0.5)
 
 @cache
 def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
-    """Return the slider's linear equation at 1 rad/s.
-
-    Without gravity only its spring and damper terms depend on the speed; `linear` sets them for other speeds.
-    """
+    """Return the slider's linear equation at 1 rad/s; at another speed only spring and damper differ, see `linear`."""
     return slider_equation(chapter_4(inertia_ratio), 1.0, variant=variant, form=Form.RESONANCE)
 
 
+@cache
 def linear(
-    speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
+    speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT, harmonics: int = 2
 ) -> HarmonicMotion:
-    """Return the periodic motion zeta at a crank speed (rad/s) by two harmonics, as in the thesis."""
+    """Return the periodic motion zeta at a crank speed (rad/s), as in the thesis by two harmonics."""
     once = equation(inertia_ratio, variant)
-    return two_harmonics(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed))
+    return harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed), harmonics)
 
 
 def harmonic(
-    n: int, speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
-) -> NDArray[np.float64]:
-    """Return the amplitude of the n-th harmonic of zeta at each speed (rad/s)."""
-    return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
-
-
-def ten_harmonics(inertia_ratio: float) -> NDArray[np.float64]:
-    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVERY`, at omega_c `COMPARED_AT`."""
-    once = equation(inertia_ratio, Variant.EXACT)
-    motions = (
-        harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=COMPARED_AT / speed), MANY)
-        for speed in EVERY.tolist()
-    )
-    return np.array([motion.series.amplitudes for motion in motions])
+    n: int,
+    speeds: FloatArray,
+    inertia_ratio: float,
+    omega_c: float = 0.0,
+    variant: Variant = Variant.EXACT,
+    harmonics: int = 2,
+) -> FloatArray:
+    """Return the amplitude of the n-th harmonic of zeta at each speed (rad/s); see `linear`."""
+    motions = (linear(speed, inertia_ratio, omega_c, variant, harmonics) for speed in speeds.tolist())
+    return np.array([motion.harmonic(n) for motion in motions])
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
@@ -123,11 +116,8 @@ def deviation(inertia_ratio: float, variant: Variant = Variant.EXACT) -> float:
 
 
 @cache
-def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
-    """Return the amplitude of the n-th harmonic over the speed without a damper, as columns by name.
-
-    The correct equation has three inertia ratios I4; the other variants have I4 = 1 only.
-    """
+def undamped_columns(n: int) -> dict[str, FloatArray]:
+    """Return the undamped n-th harmonic over the speed as columns: right for three I4, the other variants for I4 = 1."""
     columns = {"speed [rad/s]": SPEEDS}
     for ratio in INERTIA_RATIOS:
         for variant, name in VARIANTS.items():
@@ -136,7 +126,7 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
     return columns
 
 
-def range_above(level: float, speeds: NDArray[np.float64], curve: NDArray[np.float64]) -> float:
+def range_above(level: float, speeds: FloatArray, curve: FloatArray) -> float:
     """Return the width of the range between the first and the last of the speeds at which a curve crosses a level."""
     (at,) = np.nonzero((curve[:-1] > level) != (curve[1:] > level))
     crossed = speeds[at] + (level - curve[at]) / (curve[at + 1] - curve[at]) * np.diff(speeds)[at]
@@ -185,58 +175,57 @@ def compute_first() -> StudyResult:
         "4.4, 4.6 and 4.7 are found with two harmonics, as in (4.30), unless a row says otherwise.",
         columns=undamped_columns(1),
         statements=(
-            Statement(
+            statement(
                 "The figures show that resonance for the first harmonic occurs in the region of ([omega_k] - d) < "
                 "[omega] < [omega_k] where d = 1 rad./sec.",
-                text("4.5.1, L3139-3143"),
+                "4.5.1, L3139-3143",
                 "distance below omega_k = 31.623 rad/s of the resonance by the right equation, which is the lower of the "
                 "two neighbouring roots of the determinant of (4.33); I4 as in Figs 4.6 and 4.7",
                 f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*; half a unit of the one digit of d "
                 "would allow more, 0.5",
-                (
-                    *(
-                        Case(
-                            label=f"I4 = {ratio:g}",
-                            stated="1",
-                            computed=below[ratio],
-                            lower=0.0,
-                            upper=1.0 + ABOUT,
-                            unit="rad/s",
-                        )
-                        for ratio in sorted(DAMPED_RATIOS)
-                    ),
-                    Case(label="third ratio", computed=None, why="the text names no ratio for this figure"),
+                *(
+                    Case(
+                        label=f"I4 = {ratio:g}",
+                        stated="1",
+                        computed=below[ratio],
+                        lower=0.0,
+                        upper=1.0 + ABOUT,
+                        unit="rad/s",
+                    )
+                    for ratio in sorted(DAMPED_RATIOS)
                 ),
-                f"at 1.5, our choice, the distance would be {below[1.5]:.2f} rad/s",
+                unjudged("third ratio", "the text names no ratio for this figure"),
+                why=f"at 1.5, our choice, the distance would be {below[1.5]:.2f} rad/s",
             ),
-            Statement(
+            statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
-                text("4.5.1, L3143-3146"),
+                "4.5.1, L3143-3146",
                 "distance of the resonance below omega_k that follows from the mean of M alone, divided by the distance of "
                 "the lower root of the determinant. The mean of M exceeds 1 by the rocker's inertia. *Oscillating inertia "
                 "of the rocker* is read as the inertia of the rocker, which oscillates",
                 ALIKE_WORDS,
-                tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
+                *(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),
-            Statement(
+            statement(
                 "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of [I4] "
                 "and that as [I4] increases it widens the region of resonance.",
-                text("4.5.1, L3156-3162; the same in L3197-3201"),
+                "4.5.1, L3156-3162; the same in L3197-3201",
                 "amplitudes by the right equation without a damper, from 9 to 40 rad/s except within 1 rad/s of 15.5 and 2 "
                 "rad/s of 31 rad/s; then the range of speeds in which the amplitudes exceed a level. Each is relative to "
                 "its value at the next smaller I4, and the least ratio is listed. Speeds and levels are our choice",
                 SIGN,
-                (*judge_growth(1), *judge_growth(2)),
+                *judge_growth(1),
+                *judge_growth(2),
             ),
-            Statement(
+            statement(
                 "THIS[ ]PROG. I[N]VISTIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
                 listing("appendix 2, L8398"),
                 "*investigates* is read as finds right: speed and height of the peak of the first harmonic, and height of "
                 "the peak of the second, by the listing, but between its steps in speed, and by the right equation. omega_c = "
                 f"{DAMPERS[0]:g} 1/s is the listing's first damper; I4 = 1 is the listing's, and 0.5 that of Fig 4.7",
                 f"{HALF_STEP:g} rad/s, half a step of the listing; {ABOUT:g} of the amplitude, the rule for *about*",
-                listed_cases(),
-                "the force of the listing lacks most of its second harmonic (erratum 21)",
+                *listed_cases(),
+                why="the force of the listing lacks most of its second harmonic (erratum 21)",
             ),
         ),
     )
@@ -245,7 +234,8 @@ def compute_first() -> StudyResult:
 def compute_second() -> StudyResult:
     """Compute Fig 4.4: the second harmonic, and its size relative to the first."""
     columns = undamped_columns(2)
-    ten = [ten_harmonics(r) for r in INERTIA_RATIOS]
+    motions = ([linear(speed, r, COMPARED_AT, harmonics=MANY) for speed in EVERY.tolist()] for r in INERTIA_RATIOS)
+    ten = [np.array([motion.series.amplitudes for motion in those]) for those in motions]
     seconds, highers = (
         {
             "greatest over greatest": max(x[:, n].max() / x[:, 1].max() for x in ten),
@@ -262,36 +252,32 @@ def compute_second() -> StudyResult:
         assignment="The three inertia ratios are our choice, as in Fig 4.3.",
         columns=columns,
         statements=(
-            Statement(
+            statement(
                 "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
-                text("4.5.3 a, L3188-3195"),
+                "4.5.3 a, L3188-3195",
                 "distance below omega_k, or below omega_k/2, of the upper of the two neighbouring roots of the determinant of "
                 "(4.33) by the right equation, at I4 = 0.5, 1 and 1.5: the least; then the greatest divided by the least",
                 f"{SIGN}; more than {1.0 + ALIKE:g}, the rule for *the same*, as *depends* says",
-                (
-                    *(at_least(f"{word} harmonic, least", 0.0, min(x), "rad/s") for word, x in below.items()),
-                    *(
-                        at_least(f"{word} harmonic, greatest over least", 1.0 + ALIKE, max(x) / min(x))
-                        for word, x in below.items()
-                    ),
+                *(at_least(f"{word} harmonic, least", 0.0, min(x), "rad/s") for word, x in below.items()),
+                *(
+                    at_least(f"{word} harmonic, greatest over least", 1.0 + ALIKE, max(x) / min(x))
+                    for word, x in below.items()
                 ),
             ),
-            Statement(
+            statement(
                 "It is also clear by comparing the amplitude values in both figures that the first harmonic of the "
                 "solution is dominant and the second harmonic may be neglected in comparison.",
-                text("4.5.1, L3162-3168; the same in L3210-3214"),
+                "4.5.1, L3162-3168; the same in L3210-3214",
                 "second harmonic, and greatest of the third to the tenth (*higher*, L3212), divided by the first: the "
                 "greatest values of each, and the values at the same speed. The largest ratio of the three I4 from 9 to 40 "
                 f"rad/s (as in appendix 2) is listed, by the right equation with omega_c = {COMPARED_AT:g} 1/s, the value of "
                 "5.3.2; without a damper the resonances have no bound",
                 f"1, since the *dominant* harmonic is the greater; {SMALL:g}, the rule for *negligible*",
-                (
-                    *(at_most(f"first dominant; {words}", 1.0, share) for words, share in seconds.items()),
-                    *(at_most(f"second negligible; {words}", SMALL, share) for words, share in seconds.items()),
-                    *(at_most(f"higher negligible; {words}", SMALL, share) for words, share in highers.items()),
-                ),
-                "near omega_k/2 the second harmonic has its own resonance, and near omega_k/3 the third",
+                *(at_most(f"first dominant; {words}", 1.0, share) for words, share in seconds.items()),
+                *(at_most(f"second negligible; {words}", SMALL, share) for words, share in seconds.items()),
+                *(at_most(f"higher negligible; {words}", SMALL, share) for words, share in highers.items()),
+                why="near omega_k/2 the second harmonic has its own resonance, and near omega_k/3 the third",
             ),
         ),
     )
@@ -344,22 +330,23 @@ def compute_deviation() -> StudyResult:
         assignment="The range of I4 is our choice.",
         columns=columns,
         statements=(
-            Statement(
+            statement(
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
                 "[I4] and becomes zero when [I4=0].",
-                text("4.5.1, L3146-3150"),
+                "4.5.1, L3146-3150",
                 "deviation of the lower root from omega_k, by the right equation: its distance from the straight line "
                 "through zero and its value at I4 = 1.5 (our choice), relative to that value; then the deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
-                (at_most("distance from the line", ALIKE, bent), near("at I4 = 0", 0.0, found[0], 1e-6, "rad/s")),
+                at_most("distance from the line", ALIKE, bent),
+                near("at I4 = 0", 0.0, found[0], 1e-6, "rad/s"),
             ),
-            Statement(
+            statement(
                 "In fact for the case [I4]=0 the equation of motion of the slider reduces to a second order linear "
                 "differential equation describing an idealised spring-mass system.",
-                text("4.5.1, L3152-3156"),
+                "4.5.1, L3152-3156",
                 "greatest harmonic or mean of M - 1, K and F of the right equation at I4 = 0",
                 "1e-12, above rounding errors",
-                (at_most("", 1e-12, rest),),
+                at_most("", 1e-12, rest),
             ),
         ),
     )
@@ -400,10 +387,7 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def flattening_damper(inertia_ratio: float, times: float) -> float:
-    """Find the damper omega_c (1/s) that limits the peak of the first harmonic.
-
-    The peak is then ``times`` the amplitude of this harmonic at a speed higher by `OUTSIDE`.
-    """
+    """Find the omega_c (1/s) with which the first harmonic's peak is ``times`` its amplitude at a speed higher by `OUTSIDE`."""
 
     def excess(omega_c: float) -> float:
         at, height = peak(1, inertia_ratio, omega_c)
@@ -412,14 +396,11 @@ def flattening_damper(inertia_ratio: float, times: float) -> float:
     return float(brentq(excess, 0.1, 12.0, xtol=1e-6))
 
 
-def one_mass_amplitude(speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """Return the amplitude of a single mass on a spring at the speeds (rad/s), under the first harmonic of the force.
-
-    The mass and the spring follow from the mean values of M and K.
-    """
+def one_mass_amplitude(speeds: FloatArray, inertia_ratio: float, omega_c: float) -> FloatArray:
+    """Return a single mass's amplitude at the speeds (rad/s), with the means of M and K, under the force's first harmonic."""
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / speeds**2 + found.stiffness.mean - found.mass.mean
-    amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / speeds)
+    amplitude: FloatArray = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / speeds)
     return amplitude
 
 
@@ -465,83 +446,74 @@ def compute_damped(inertia_ratio: float) -> StudyResult:
         assignment="The dampers are those of the listing of appendix 2. We take the amplitude to be that of the first "
         "harmonic.",
         columns=columns,
-        statements=_curves() if inertia_ratio == 1.0 else _dampers(),
+        statements=tuple(_curves() if inertia_ratio == 1.0 else _dampers()),
     )
 
 
-def _curves() -> tuple[Statement, ...]:
+def _curves() -> Iterator[Statement]:
     """Judge the statements on the curves of Fig 4.6 and 4.7."""
     both = {f"I4 = {ratio:g}": damper_effects(ratio) for ratio in DAMPED_RATIOS}
-    return (
-        Statement(
-            "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
-            text("4.5.2, L3176-3178; the same in L3203-3206"),
-            f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, relative to the peak at "
-            f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s (our choice) from "
-            "the peaks. The second harmonic is included, since L3203 speaks of *the solution*",
-            ALIKE_WORDS,
-            tuple(
-                at_most(f"{name}; {label}", ALIKE, found[name])
-                for label, found in both.items()
-                for name in ("first harmonic", "second harmonic")
-            ),
+    yield statement(
+        "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
+        "4.5.2, L3176-3178; the same in L3203-3206",
+        f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, relative to the peak at "
+        f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s (our choice) from "
+        "the peaks. The second harmonic is included, since L3203 speaks of *the solution*",
+        ALIKE_WORDS,
+        *(
+            at_most(f"{name}; {label}", ALIKE, found[name])
+            for label, found in both.items()
+            for name in ("first harmonic", "second harmonic")
         ),
-        Statement(
-            "The resonance curves are similar to a second order linear system",
-            text("4.5.3 d, L3206-3208"),
-            "greatest distance of the first harmonic, in Figs 4.6 and 4.7, from the amplitude of a single mass on a spring, "
-            "relative to the peak. The single mass has the means of M and K and the first harmonic of F. Right equation, 27 "
-            f"to 35 rad/s (our choice), omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
-            f"{ABOUT:g}, the rule for *similar*",
-            tuple(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
-            "but near half the natural frequency the second harmonic has its own resonance, see L7102",
-        ),
+    )
+    yield statement(
+        "The resonance curves are similar to a second order linear system",
+        "4.5.3 d, L3206-3208",
+        "greatest distance of the first harmonic, in Figs 4.6 and 4.7, from the amplitude of a single mass on a spring, "
+        "relative to the peak. The single mass has the means of M and K and the first harmonic of F. Right equation, 27 "
+        f"to 35 rad/s (our choice), omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
+        f"{ABOUT:g}, the rule for *similar*",
+        *(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
+        why="but near half the natural frequency the second harmonic has its own resonance, see L7102",
     )
 
 
-def _dampers() -> tuple[Statement, ...]:
+def _dampers() -> Iterator[Statement]:
     """Judge the statements on the dampers of Fig 4.6 and 4.7."""
     both = {f"I4 = {inertia:g}": damper_effects(inertia) for inertia in DAMPED_RATIOS}
     high, low = ([flattening_damper(inertia, times) for times in TIMES] for inertia in DAMPED_RATIOS)
     ratio = 0.5 * STRONGEST / OMEGA_K
-    return (
-        Statement(
-            "The natural frequency decreases slightly with increase of damping.",
-            text("4.5.2, L3178-3180"),
-            f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s by the right equation: of the free "
-            "motion, by its multipliers at 20 rad/s (our choice); and of the peak of the curves, which the figures show",
-            f"{SIGN}: a damper of {100 * ratio:.1f} % of the critical one cannot lower a frequency by 5 %, as the rule for "
-            "*slightly* would require",
-            tuple(
-                at_most(
-                    f"{name}; {label}",
-                    0.0,
-                    1e3 * found[name],
-                    "mrad/s",
-                    why="the peak rises because the force grows with the square of the speed",
-                )
-                for label, found in both.items()
-                for name in ("of the free motion", "of the peak")
-            ),
+    yield statement(
+        "The natural frequency decreases slightly with increase of damping.",
+        "4.5.2, L3178-3180",
+        f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s by the right equation: of the free "
+        "motion, by its multipliers at 20 rad/s (our choice); and of the peak of the curves, which the figures show",
+        f"{SIGN}: a damper of {100 * ratio:.1f} % of the critical one cannot lower a frequency by 5 %, as the rule for "
+        "*slightly* would require",
+        *(
+            at_most(
+                f"{name}; {label}",
+                0.0,
+                1e3 * found[name],
+                "mrad/s",
+                why="the peak rises because the force grows with the square of the speed",
+            )
+            for label, found in both.items()
+            for name in ("of the free motion", "of the peak")
         ),
-        Statement(
-            "It also shows that a smaller value of damping eliminated resonance for the case of [I4]=0.5 than that for "
-            "[I4] = 1.",
-            text("4.5.2, L3182-3184"),
-            f"damper that lowers the peak of the first harmonic to 1.5, 2 or 5 times its amplitude {OUTSIDE:g} rad/s above "
-            "the peak, which is our reading of *eliminated*; its value at I4 = 0.5 relative to that at I4 = 1; right "
-            "equation",
-            SIGN,
-            tuple(at_most(f"{times:g} times", 1.0, less / more) for times, less, more in zip(TIMES, low, high)),
-        ),
+    )
+    yield statement(
+        "It also shows that a smaller value of damping eliminated resonance for the case of [I4]=0.5 than that for [I4] = 1.",
+        "4.5.2, L3182-3184",
+        f"damper that lowers the peak of the first harmonic to 1.5, 2 or 5 times its amplitude {OUTSIDE:g} rad/s above the "
+        "peak, which is our reading of *eliminated*; its value at I4 = 0.5 relative to that at I4 = 1; right equation",
+        SIGN,
+        *(at_most(f"{times:g} times", 1.0, less / more) for times, less, more in zip(TIMES, low, high)),
     )
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """Draw the first harmonic with each damper by the correct equation.
-
-    With the strongest damper also draw it by the variants of the equation and by the plant.
-    """
+    """Draw the first harmonic with each damper; with the strongest also by the variants of the equation and by the plant."""
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; corrected [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

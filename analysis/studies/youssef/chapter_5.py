@@ -10,13 +10,12 @@ A of a region is omega/omega_k in its middle.
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -34,7 +33,7 @@ from ...youssef import (
     slider_equation,
 )
 from ..rules import ABOUT, ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, listing, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, listing, near, statement
 from ..study import Study, StudyResult
 from .linearised import with_crank
 from .regions import LOOKS, WAYS, appendix_3_region, axis, crank_speed, equation, hill_region, orbit_region
@@ -60,7 +59,7 @@ class Sweep:
     values: Sequence[float]
     mechanism: Callable[[float], FiveBarParameters]
     claim: str
-    judge: Callable[[Mapping[str, Sequence[Region]]], tuple[Statement, ...]]
+    judge: Callable[[Mapping[str, Sequence[Region]]], Iterable[Statement]]
     assignment: str = ""
     further: Mapping[str, Callable[[float], FiveBarParameters]] | None = None
 
@@ -75,12 +74,12 @@ def regions(name: str) -> dict[str, list[Region]]:
     return found
 
 
-def widths(found: Iterable[Region]) -> NDArray[np.float64]:
+def widths(found: Iterable[Region]) -> FloatArray:
     """Return the widths of the regions in lambda_k^2."""
     return np.array([region.width for region in found])
 
 
-def axes(found: Iterable[Region]) -> NDArray[np.float64]:
+def axes(found: Iterable[Region]) -> FloatArray:
     """Return the axes A of the regions."""
     return np.array([axis(region) for region in found])
 
@@ -92,7 +91,9 @@ def compute_sweep(number: str) -> StudyResult:
     for way, these in found.items():
         columns[f"lambda_k^2; {way}; low [1]"] = np.array([region.low for region in these])
         columns[f"lambda_k^2; {way}; high [1]"] = np.array([region.high for region in these])
-    return StudyResult(claim=sweep.claim, assignment=sweep.assignment, columns=columns, statements=sweep.judge(found))
+    return StudyResult(
+        claim=sweep.claim, assignment=sweep.assignment, columns=columns, statements=tuple(sweep.judge(found))
+    )
 
 
 def draw_sweep(result: StudyResult) -> Figure:
@@ -124,85 +125,77 @@ def draw_sweep(result: StudyResult) -> Figure:
     return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))
 
 
-def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
+def judge_inertia(found: Mapping[str, Sequence[Region]]) -> Iterator[Statement]:
     """Judge the statements on Fig 5.1 and on the formulas behind it."""
     true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
     middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
     bent = np.abs(middles - middles[-1] / ratios[-1] * ratios).max() / middles[-1]
     listed, linear = appendix_3_region(chapter_4(0.5)), hill_region(chapter_4(0.5))
     shifts = [f"{shift_by_motion(ratio):.3f}" for ratio in COMPARED]
-    return (
-        Statement(
-            "As is clearly seen the region is narrow and its width increases with increase of I4.",
-            text("5.3.1, L3762-3764; the same in L3944-3946"),
-            "greatest width of the region in lambda_k^2 relative to its middle; least growth of the width from one I4 to the "
-            "next; for the true periodic motion",
-            f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {SIGN}",
-            (
-                at_most("width", SMALL, (widths(true) / (middles + 0.25)).max()),
-                at_least("growth", 0.0, np.diff(widths(true)).min()),
-            ),
+    yield statement(
+        "As is clearly seen the region is narrow and its width increases with increase of I4.",
+        "5.3.1, L3762-3764; the same in L3944-3946",
+        "greatest width of the region in lambda_k^2 relative to its middle; least growth of the width from one I4 to the "
+        "next; for the true periodic motion",
+        f"{SMALL:g}, the rule for *small*, which we use for *narrow* too; {SIGN}",
+        at_most("width", SMALL, (widths(true) / (middles + 0.25)).max()),
+        at_least("growth", 0.0, np.diff(widths(true)).min()),
+    )
+    yield statement(
+        "The region in [lambda_k^2] as a band also increases linearly with [I4] indicating that [insta]bility occurs "
+        "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
+        "5.3.1, L3764-3770; the same in L3946-3950",
+        "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative "
+        "to the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A from one I4 to the next. For the "
+        "true periodic motion, at I4 = 0 for the right linear equation",
+        f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
+        at_most("distance from the line", ALIKE, bent),
+        near("A at I4 = 0", "2", axis(hill_region(chapter_4(0.0))), 1e-5),
+        at_most("growth of A, greatest", 0.0, np.diff(axes(true)).max()),
+    )
+    yield statement(
+        "The stability of equation (4.29) may be investigated by considering the homogeneous part of it only.",
+        "5.1, L3266-3268",
+        "Floquet multipliers of the equation with its force, from solutions with three starts, minus those of its homogeneous "
+        "part, in the middle of the first region at I4 = 1; for (4.29) as printed and for the right linear equation",
+        "1e-6, the accuracy of the solutions",
+        *judge_homogeneous_part(),
+        why="for the mechanism, which is stable or not about the motion that the force causes (erratum 6), the region's "
+        f"boundaries differ from those of the right linear equation by up to {', '.join(shifts[:-1])} and {shifts[-1]} of "
+        "its width at I4 = 0.5, 1 and 1.5",
+    )
+    yield statement(
+        "Also notice that a region was not obtained but merely a boundary of two stable regions.",
+        "5.1.1 a, L3420-3424",
+        "number of boundaries, below the second region, at which a Floquet multiplier is 1. Then the larger of the two "
+        "multipliers at I4 = 0.5, 1 and 1.5: the greatest at 1.5 times lambda_k^2 of this boundary, and the least at "
+        "half of it (our choice); right linear equation without a damper",
+        "none for the number; 1 for stability, with 1e-9 for rounding errors",
+        *judge_zeroth_boundary(),
+        why="below the boundary, at higher speeds, the slider falls away. By (5.13) the boundary lies below lambda_k^2 = 0, "
+        "which no spring gives; the mean of the right K, of second order in sigma2, puts it above 0",
+    )
+    yield statement(
+        "Therefore from ([5].2), (5.4) and (5.12) we obtain [(5.13)] ... a region for [lambda_k^2] may be defined by "
+        "[(5.16)] in which the system is unstable ... the second region of instability may now be defined by [(5.26)]",
+        "5.1.1, eqs (5.13), (5.16), (5.26), L3404-3416, L3446-3464, L3555-3575",
+        "boundaries by the formulas minus those by the determinant (5.35), for equation (4.29) as printed, relative to the "
+        "region's width, and with (5.13) relative to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. Signs that our "
+        "scan lacks or has wrong follow from (5.2), (5.11) and (5.23); h0 = 0, since the coupler has no mass",
+        f"{SMALL:g}, the rule for *small*, for the next order",
+        *judge_formulas(),
+    )
+    yield statement(
+        "THIS PROG. INVISTIGATES STABILITY IN ABSENCE [O]F DAMPING",
+        listing("appendix 3, L8638"),
+        "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing exactly as printed, at its I4 = "
+        "0.5 and at sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
+        f"{SMALL:g} of the width by the right equation, the rule for *small*, for the next order, which (5.16) leaves out",
+        *(
+            near(side, f"{stated:.6f}", computed, SMALL * linear.width)
+            for side, stated, computed in (("lower", listed.low, linear.low), ("upper", listed.high, linear.high))
         ),
-        Statement(
-            "The region in [lambda_k^2] as a band also increases linearly with [I4] indicating that [insta]bility occurs "
-            "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
-            text("5.3.1, L3764-3770; the same in L3946-3950"),
-            "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative "
-            "to the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A from one I4 to the next. For the "
-            "true periodic motion, at I4 = 0 for the right linear equation",
-            f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
-            (
-                at_most("distance from the line", ALIKE, bent),
-                near("A at I4 = 0", "2", axis(hill_region(chapter_4(0.0))), 1e-5),
-                at_most("growth of A, greatest", 0.0, np.diff(axes(true)).max()),
-            ),
-        ),
-        Statement(
-            "The stability of equation (4.29) may be investigated by considering the homogeneous part of it only.",
-            text("5.1, L3266-3268"),
-            "Floquet multipliers of the equation with its force, from solutions with three starts, minus those of its "
-            "homogeneous part, in the middle of the first region at I4 = 1; for (4.29) as printed and for the right linear "
-            "equation",
-            "1e-6, the accuracy of the solutions",
-            judge_homogeneous_part(),
-            "for the mechanism, which is stable or not about the motion that the force causes (erratum 6), the region's "
-            f"boundaries differ from those of the right linear equation by up to {', '.join(shifts[:-1])} and {shifts[-1]} of "
-            "its width at I4 = 0.5, 1 and 1.5",
-        ),
-        Statement(
-            "Also notice that a region was not obtained but merely a boundary of two stable regions.",
-            text("5.1.1 a, L3420-3424"),
-            "number of boundaries, below the second region, at which a Floquet multiplier is 1. Then the larger of the two "
-            "multipliers at I4 = 0.5, 1 and 1.5: the greatest at 1.5 times lambda_k^2 of this boundary, and the least at "
-            "half of it (our choice); right linear equation without a damper",
-            "none for the number; 1 for stability, with 1e-9 for rounding errors",
-            judge_zeroth_boundary(),
-            "below the boundary, at higher speeds, the slider falls away. By (5.13) the boundary lies below lambda_k^2 = 0, "
-            "which no spring gives; the mean of the right K, of second order in sigma2, puts it above 0",
-        ),
-        Statement(
-            "Therefore from ([5].2), (5.4) and (5.12) we obtain [(5.13)] ... a region for [lambda_k^2] may be defined by "
-            "[(5.16)] in which the system is unstable ... the second region of instability may now be defined by [(5.26)]",
-            text("5.1.1, eqs (5.13), (5.16), (5.26), L3404-3416, L3446-3464, L3555-3575"),
-            "boundaries by the formulas minus those by the determinant (5.35), for equation (4.29) as printed, relative to "
-            "the region's width, and with (5.13) relative to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. "
-            "Signs that our scan lacks or has wrong follow from (5.2), (5.11) and (5.23); h0 = 0, since the coupler has no "
-            "mass",
-            f"{SMALL:g}, the rule for *small*, for the next order",
-            judge_formulas(),
-        ),
-        Statement(
-            "THIS PROG. INVISTIGATES STABILITY IN ABSENCE [O]F DAMPING",
-            listing("appendix 3, L8638"),
-            "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing exactly as printed, at its I4 = "
-            "0.5 and at sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
-            f"{SMALL:g} of the width by the right equation, the rule for *small*, for the next order, which (5.16) leaves out",
-            tuple(
-                near(side, f"{stated:.6f}", computed, SMALL * linear.width)
-                for side, stated, computed in (("lower", listed.low, linear.low), ("upper", listed.high, linear.high))
-            ),
-            "M' zeta' and 1/k0 are missing, and the harmonics of mass and stiffness are wrong (errata 2, 16, 18, 20)",
-        ),
+        why="M' zeta' and 1/k0 are missing, and the harmonics of mass and stiffness are wrong (errata 2, 16, 18, 20)",
     )
 
 
@@ -223,7 +216,7 @@ def change_by_force(with_force: SliderEquation) -> float:
     """Return by how much the force of a linear equation changes its Floquet multipliers."""
     without = with_force.homogeneous().stiffened(with_force.spring)
 
-    def derivative(t: float, y: NDArray[np.float64]) -> list[float]:
+    def derivative(t: float, y: FloatArray) -> list[float]:
         a, b, c, force = (float(x(t)) for x in (without.a, without.b, without.c, with_force.force))
         return [y[1], (force - b * y[1] - c * y[0]) / a]
 
@@ -234,19 +227,13 @@ def change_by_force(with_force: SliderEquation) -> float:
 
 
 def shift_by_motion(ratio: float) -> float:
-    """Return the shift of the first region's boundaries by the motion that the force causes, relative to the region's width.
-
-    It is the greater distance of a boundary by the right linear equation from the same boundary of the true periodic motion.
-    """
+    """Return a boundary's greatest shift from the linear equation's to the true motion's, relative to the region's width."""
     linear, true = (method(chapter_4(ratio)) for method in (hill_region, orbit_region))
     return max(abs(linear.low - true.low), abs(linear.high - true.high)) / true.width
 
 
 def listed_boundaries(given: SliderEquation) -> tuple[tuple[float, float], ...]:
-    """Return the boundaries (low, high) in lambda_k^2 of regions 0 to 2 by (5.13), (5.16) and (5.26), with h0 = 0.
-
-    Region 0 is the zeroth boundary, given twice.
-    """
+    """Return the boundaries (low, high) in lambda_k^2 of regions 0 (one, twice) to 2 by (5.13), (5.16), (5.26), h0 = 0."""
     s, k = given.spring_factor, given.stiffness.to_order(2)
 
     def amplitudes(n: int, lambda_k2: float) -> tuple[float, float]:
@@ -306,43 +293,39 @@ def widest_by_inertia() -> dict[float, float]:
     return {most: float(found[np.array(SWEEPS["5.1"].values) <= most].max()) for most in RANGES}
 
 
-def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
+def judge_crank(found: Mapping[str, Sequence[Region]]) -> Iterator[Statement]:
     """Judge the statements on Fig 5.2."""
     true = found["true orbit"]
     at_half, listed = (
         [axis(of(with_crank(sigma2, 0.5))) for sigma2 in (0.01, 0.1)] for of in (orbit_region, appendix_3_region)
     )
     over = {most: widths(true).max() / x for most, x in widest_by_inertia().items()}
-    return (
-        Statement(
-            "The width of the region increases with increase of [sigma2].",
-            text("5.3.1, L3876; for crank and coupler again in L3938-3942"),
-            "least growth of the width from one sigma2 to the next, from 0.01 to 0.1 in steps of 0.01; for the true periodic "
-            "motion",
-            SIGN,
-            (at_least("", 0.0, np.diff(widths(true)).min()),),
-        ),
-        Statement(
-            "However the region diverges about an axis approximately given by [omega]=A.[omega_k] where A=1.968 when "
-            "[sigma2] = 0.01 and increasing very slightly with increase of [sigma2].",
-            text("5.3.1, L3878-3882"),
-            "axis A = omega/omega_k in the middle of the region at sigma2 = 0.01; growth of A up to sigma2 = 0.1; for the "
-            "true periodic motion. That the region diverges is judged in the row above",
-            f"{OF_AXIS}; {SIGN}",
-            (
-                near("A", "1.968", axes(true)[0], ABOUT * (2.0 - 1.968)),
-                at_least("growth of A", 0.0, axes(true)[-1] - axes(true)[0]),
-            ),
-            f"at I4 = 0.5, which the listing has (L8641), A is {at_half[0]:.4f} at sigma2 = 0.01 and {at_half[1]:.4f} at 0.1; "
-            f"only by the listing does it grow, from {listed[0]:.4f} to {listed[1]:.4f}",
-        ),
-        Statement(
-            "The[ ]region is narrower than that of Fig. (5.1).",
-            text("5.3.1, L3882-3884"),
-            why="the range of I4 in Fig 5.1 is not stated. In the true periodic motion the greatest width, up to sigma2 = "
-            "0.1 (L3927), is "
-            + ", and ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
-        ),
+    yield statement(
+        "The width of the region increases with increase of [sigma2].",
+        "5.3.1, L3876; for crank and coupler again in L3938-3942",
+        "least growth of the width from one sigma2 to the next, from 0.01 to 0.1 in steps of 0.01; for the true periodic "
+        "motion",
+        SIGN,
+        at_least("", 0.0, np.diff(widths(true)).min()),
+    )
+    yield statement(
+        "However the region diverges about an axis approximately given by [omega]=A.[omega_k] where A=1.968 when "
+        "[sigma2] = 0.01 and increasing very slightly with increase of [sigma2].",
+        "5.3.1, L3878-3882",
+        "axis A = omega/omega_k in the middle of the region at sigma2 = 0.01; growth of A up to sigma2 = 0.1; for the "
+        "true periodic motion. That the region diverges is judged in the row above",
+        f"{OF_AXIS}; {SIGN}",
+        near("A", "1.968", axes(true)[0], ABOUT * (2.0 - 1.968)),
+        at_least("growth of A", 0.0, axes(true)[-1] - axes(true)[0]),
+        why=f"at I4 = 0.5, which the listing has (L8641), A is {at_half[0]:.4f} at sigma2 = 0.01 and {at_half[1]:.4f} at 0.1; "
+        f"only by the listing does it grow, from {listed[0]:.4f} to {listed[1]:.4f}",
+    )
+    yield statement(
+        "The[ ]region is narrower than that of Fig. (5.1).",
+        "5.3.1, L3882-3884",
+        why="the range of I4 in Fig 5.1 is not stated. In the true periodic motion the greatest width, up to sigma2 = "
+        "0.1 (L3927), is "
+        + ", and ".join(f"{x:.2f} of that of Fig 5.1 up to {RANGES[most]}" for most, x in over.items()),
     )
 
 
@@ -363,7 +346,7 @@ def with_same_ground(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParame
 SAME_GROUND = "true orbit on the same ground link"
 
 
-def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
+def judge_coupler(found: Mapping[str, Sequence[Region]]) -> Iterator[Statement]:
     """Judge the statements on Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
@@ -379,64 +362,60 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         }
         for variant in (Variant.EXACT, Variant.FORTRAN)
     )
-    return (
-        Statement(
-            "The width of the region decreases with increase of [sigma3].",
-            text("5.3.1, L3892; for crank and coupler again in L3938-3942"),
-            "greatest growth of the width from one sigma3 to the next, from 0.8 to 1.2 in steps of 0.025; for the true "
-            "periodic motion",
-            SIGN,
-            tuple(at_most(words, 0.0, np.diff(widths(found_regions)).max()) for words, found_regions in both.items()),
-            "on the same ground link, the region widens when the coupler is longer than about sigma3 = 1",
+    yield statement(
+        "The width of the region decreases with increase of [sigma3].",
+        "5.3.1, L3892; for crank and coupler again in L3938-3942",
+        "greatest growth of the width from one sigma3 to the next, from 0.8 to 1.2 in steps of 0.025; for the true "
+        "periodic motion",
+        SIGN,
+        *(at_most(words, 0.0, np.diff(widths(found_regions)).max()) for words, found_regions in both.items()),
+        why="on the same ground link, the region widens when the coupler is longer than about sigma3 = 1",
+    )
+    yield statement(
+        "It also converges about an axis given by [omega]=A.[omega_k] where A=1.96 when [sigma3] = 0.8 and stays "
+        "approximately constant with increase of [sigma3].",
+        "5.3.1, L3892-3898",
+        "axis A at sigma3 = 0.8; its range over sigma3 = 0.8 to 1.2, relative to 2 - A at 0.8; for the true periodic "
+        "motion. That the region converges is judged in the row above",
+        f"half a unit of the last digit; {OF_AXIS}",
+        *(
+            case
+            for words, found_regions in both.items()
+            for case in (
+                near(f"A; {words}", "1.96", axes(found_regions)[0]),
+                at_most(f"range; {words}", ABOUT, np.ptp(axes(found_regions)) / (2.0 - axes(found_regions)[0])),
+            )
         ),
-        Statement(
-            "It also converges about an axis given by [omega]=A.[omega_k] where A=1.96 when [sigma3] = 0.8 and stays "
-            "approximately constant with increase of [sigma3].",
-            text("5.3.1, L3892-3898"),
-            "axis A at sigma3 = 0.8; its range over sigma3 = 0.8 to 1.2, relative to 2 - A at 0.8; for the true periodic "
-            "motion. That the region converges is judged in the row above",
-            f"half a unit of the last digit; {OF_AXIS}",
-            tuple(
-                case
-                for words, found_regions in both.items()
-                for case in (
-                    near(f"A; {words}", "1.96", axes(found_regions)[0]),
-                    at_most(f"range; {words}", ABOUT, np.ptp(axes(found_regions)) / (2.0 - axes(found_regions)[0])),
-                )
-            ),
-            f"at I4 = 0.5, which the listing has (L8641), A is {at_half:.4f} with the angles held",
+        why=f"at I4 = 0.5, which the listing has (L8641), A is {at_half:.4f} with the angles held",
+    )
+    yield statement(
+        "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
+        "5.3.1, L3898-3900",
+        "greatest width of the region, with the angles held, relative to that of each other figure; for the true "
+        "periodic motion. The range of I4 in Fig 5.1 is not stated; we take the two ranges of the row at L3882",
+        SIGN,
+        *(
+            at_most(
+                f"Fig 5.1, up to I4 = {most:g}",
+                1.0,
+                widest / width,
+                why=("I4 is 2 here, and " if most < 2.0 else "") + "a shorter coupler widens the region",
+            )
+            for most, width in widest_by_inertia().items()
         ),
-        Statement(
-            "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
-            text("5.3.1, L3898-3900"),
-            "greatest width of the region, with the angles held, relative to that of each other figure; for the true "
-            "periodic motion. The range of I4 in Fig 5.1 is not stated; we take the two ranges of the row at L3882",
-            SIGN,
-            (
-                *(
-                    at_most(
-                        f"Fig 5.1, up to I4 = {most:g}",
-                        1.0,
-                        widest / width,
-                        why=("I4 is 2 here, and " if most < 2.0 else "") + "a shorter coupler widens the region",
-                    )
-                    for most, width in widest_by_inertia().items()
-                ),
-                at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and a greater I4 widens the region"),
-            ),
-        ),
-        Statement(
-            "In all the above examples the second region of instability was so small within the values of [sigma2], "
-            "[sigma3] and [I4] it was negligible.",
-            text("5.3.1, L3902-3906"),
-            "width of the second region in lambda_k^2 relative to that of the first, the greatest of each figure, in Fig "
-            "5.3 with the angles held; right linear equation",
-            f"{SMALL:g}, the rule for *negligible*, relative to the first region; relative to its middle even the first "
-            "region would be negligible",
-            tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
-            "in the width of the first region the terms of first order largely cancel. By the listing of appendix 4 they do "
-            f"not, and the ratio is at most {max(listed.values()):.3f} (errata 2, 16, 17, 20)",
-        ),
+        at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and a greater I4 widens the region"),
+    )
+    yield statement(
+        "In all the above examples the second region of instability was so small within the values of [sigma2], "
+        "[sigma3] and [I4] it was negligible.",
+        "5.3.1, L3902-3906",
+        "width of the second region in lambda_k^2 relative to that of the first, the greatest of each figure, in Fig "
+        "5.3 with the angles held; right linear equation",
+        f"{SMALL:g}, the rule for *negligible*, relative to the first region; relative to its middle even the first "
+        "region would be negligible",
+        *(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
+        why="in the width of the first region the terms of first order largely cancel. By the listing of appendix 4 they do "
+        f"not, and the ratio is at most {max(listed.values()):.3f} (errata 2, 16, 17, 20)",
     )
 
 
@@ -466,12 +445,10 @@ SWEEPS = {
         mechanism=with_held_angles,
         claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
         judge=judge_coupler,
-        assignment=(
-            "The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
-            "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We hold 60 and "
-            "120 deg, the angles with B at the crank shaft; the listing has 57 and 120 deg at a crank angle of 149 deg, which "
-            "changes A at sigma3 = 0.8 by 0.002. We also vary the coupler on the same ground link."
-        ),
+        assignment="The text does not say what else changes with sigma3. The program of appendix 3 holds the angles of coupler "
+        "and rocker (L8641-8688), which requires another ground link and an inclined guide at every sigma3. We hold 60 and "
+        "120 deg, the angles with B at the crank shaft; the listing has 57 and 120 deg at a crank angle of 149 deg, which "
+        "changes A at sigma3 = 0.8 by 0.002. We also vary the coupler on the same ground link.",
         further={SAME_GROUND: with_same_ground},
     ),
 }

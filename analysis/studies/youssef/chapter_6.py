@@ -9,14 +9,13 @@ printed link. Lengths and errors are in the units of print, cm and degrees. Fig 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import (
@@ -34,12 +33,10 @@ from ...synthesis import (
 )
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 from .problems import AREA_N, AS_FOUND, DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_angle_deg, rocker_function
 from .stated_errors import ROUNDED, judge_stated_error, printed_error, rounding_range
-
-FloatArray = NDArray[np.float64]
 
 #: Lower bound on the transmission angle of our linkages (deg).
 TRANSMISSION = 40.0
@@ -55,14 +52,11 @@ ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 class Row(NamedTuple):
-    """Figure of chapter VI: its problem, claim, statements, and how we read illegible places.
-
-    ``see`` is the number of the figure that has the statements, if they are not given here.
-    """
+    """Figure of chapter VI: problem, claim, statements (or the figure to ``see`` for them), reading of illegible places."""
 
     problem: str
     claim: str
-    statements: Callable[[], tuple[Statement, ...]] = tuple
+    statements: Callable[[], Iterable[Statement]] = tuple
     reading: str = ""
     see: str = ""
 
@@ -96,39 +90,34 @@ READING = (
 NO_DIGIT = "no rounding gives the stated value, not even with another digit in a single place"
 
 
-def _ellipse_a() -> tuple[Statement, ...]:
+def _ellipse_a() -> Iterator[Statement]:
     rms = float(np.sqrt(printed_error("ellipse-a") / N)) / LONGER_CM
-    return (
-        Statement(
-            "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output and in "
-            "fact has an error value [E1p] of 0.889 cm2.",
-            text("6.4.2 A, L4864"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}. For *favourably*, the rms "
-            "distance of the linkage as printed, relative to the ellipse's longer semi-axis",
-            f"{HALF}; {ALIKE:g}, the rule for *the same*",
-            (judge_stated_error("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
-        ),
+    yield statement(
+        "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output and in "
+        "fact has an error value [E1p] of 0.889 cm2.",
+        "6.4.2 A, L4864",
+        f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}. For *favourably*, the rms "
+        "distance of the linkage as printed, relative to the ellipse's longer semi-axis",
+        f"{HALF}; {ALIKE:g}, the rule for *the same*",
+        judge_stated_error("error", "0.889", "ellipse-a", NO_DIGIT),
+        at_most("rms distance", ALIKE, rms),
     )
 
 
-def _ellipse_b() -> tuple[Statement, ...]:
-    return (
-        Statement(
-            "However, as may be seen from fig. (6.5), the four bar is not able to produce output (b) to the same tolerances "
-            "and has an error [E1p] of 4.001 cm2.",
-            text("6.4.2 A, L4870"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; error of this linkage "
-            "relative to that of Fig 6.4, both as printed",
-            f"{HALF}; at least 1, the rule for *greater*",
-            (
-                judge_stated_error("error", "4.001", "ellipse-b", NO_DIGIT),
-                at_least("over that of (a)", 1.0, printed_error("ellipse-b") / printed_error("ellipse-a")),
-            ),
-        ),
+def _ellipse_b() -> Iterator[Statement]:
+    yield statement(
+        "However, as may be seen from fig. (6.5), the four bar is not able to produce output (b) to the same tolerances "
+        "and has an error [E1p] of 4.001 cm2.",
+        "6.4.2 A, L4870",
+        f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; error of this linkage "
+        "relative to that of Fig 6.4, both as printed",
+        f"{HALF}; at least 1, the rule for *greater*",
+        judge_stated_error("error", "4.001", "ellipse-b", NO_DIGIT),
+        at_least("over that of (a)", 1.0, printed_error("ellipse-b") / printed_error("ellipse-a")),
     )
 
 
-def _bounded() -> tuple[Statement, ...]:
+def _bounded() -> Iterator[Statement]:
     p = PROBLEMS["ellipse-a-bounded"]
     (_, least, greatest), (_, least_a, greatest_a) = rounding_range("ellipse-a-bounded"), rounding_range("ellipse-a")
     increases = least - greatest_a, greatest - least_a
@@ -137,69 +126,56 @@ def _bounded() -> tuple[Statement, ...]:
         """Return how many of l1 to l4 are outside the printed bounds."""
         return sum(not p.bounds[name][0] <= linkage.values()[name] <= p.bounds[name][1] for name in LINKS)
 
-    return (
-        Statement(
-            "If, however, the link dimensions are constrained to have [values] within a defined range a different linkage is "
-            "obtained. Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the "
-            "following constraints [10 < l1, l3, l4 < 30, 10 > l2].",
-            text("6.4.2 A, L4905-4917"),
-            "number of lengths outside these bounds, of the printed linkage and of that of Fig 6.4",
-            "none for the numbers; one outside is enough for *different*",
-            (
-                near("lengths outside, printed", 0.0, outside(p.linkage), 0.0),
-                at_least("lengths outside, Fig 6.4", 1.0, outside(PROBLEMS["ellipse-a"].linkage)),
-            ),
+    yield statement(
+        "If, however, the link dimensions are constrained to have [values] within a defined range a different linkage is "
+        "obtained. Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the "
+        "following constraints [10 < l1, l3, l4 < 30, 10 > l2].",
+        "6.4.2 A, L4905-4917",
+        "number of lengths outside these bounds, of the printed linkage and of that of Fig 6.4",
+        "none for the numbers; one outside is enough for *different*",
+        near("lengths outside, printed", 0.0, outside(p.linkage), 0.0),
+        at_least("lengths outside, Fig 6.4", 1.0, outside(PROBLEMS["ellipse-a"].linkage)),
+    )
+    yield statement(
+        "The resulting minimum error is now 53.6 cm2 which when compared with the error resulting from the "
+        "unconstrained case gives an increase of 52.7 cm2.",
+        "6.4.2 A, L4931",
+        f"sum of the squared distances of the printed linkage at {N} crank angles, with alpha1 = -93.8 deg (erratum 11), "
+        f"{ROUNDED}; increase over the error of Fig 6.4, whose numbers are changed likewise",
+        HALF,
+        judge_stated_error(
+            "error",
+            "53.6",
+            "ellipse-a-bounded",
+            "no rounding gives the stated value, unless there is another digit in a single place, such as l4 = 22.6 cm",
         ),
-        Statement(
-            "The resulting minimum error is now 53.6 cm2 which when compared with the error resulting from the "
-            "unconstrained case gives an increase of 52.7 cm2.",
-            text("6.4.2 A, L4931"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, with alpha1 = -93.8 deg (erratum 11), "
-            f"{ROUNDED}; increase over the error of Fig 6.4, whose numbers are changed likewise",
-            HALF,
-            (
-                judge_stated_error(
-                    "error",
-                    "53.6",
-                    "ellipse-a-bounded",
-                    "no rounding gives the stated value, unless there is another digit in a single place, such as l4 = 22.6 cm",
-                ),
-                near(
-                    f"increase; rounding allows {increases[0]:.2f} to {increases[1]:.2f}",
-                    "52.7",
-                    np.clip(52.7, *increases),
-                    unit="cm2",
-                    why="neither error is as stated",
-                ),
-            ),
+        near(
+            f"increase; rounding allows {increases[0]:.2f} to {increases[1]:.2f}",
+            "52.7",
+            np.clip(52.7, *increases),
+            unit="cm2",
+            why="neither error is as stated",
         ),
     )
 
 
-def _rocker() -> tuple[Statement, ...]:
+def _rocker() -> Iterator[Statement]:
     unweighted, weighted = (p.linkage_error(p.linkage) for p in AS_FOUND.values())
-    return (
-        Statement(
-            "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
-            "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
-            text("6.4.2 B, L4965"),
-            "error of the printed linkages, with each printed number changed by at most half a unit of its last digit, by that "
-            "of the readings above that comes nearest to the stated error",
-            HALF,
-            (
-                judge_stated_error("unweighted", "700.0", "rocker"),
-                judge_stated_error("weighted", "35.0", "rocker-weighted"),
-            ),
-            f"by the reading of which both linkages are minima, the errors are {unweighted:.2f} and {weighted:.2f} deg2",
-        ),
+    yield statement(
+        "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
+        "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
+        "6.4.2 B, L4965",
+        "error of the printed linkages, with each printed number changed by at most half a unit of its last digit, by that "
+        "of the readings above that comes nearest to the stated error",
+        HALF,
+        judge_stated_error("unweighted", "700.0", "rocker"),
+        judge_stated_error("weighted", "35.0", "rocker-weighted"),
+        why=f"by the reading of which both linkages are minima, the errors are {unweighted:.2f} and {weighted:.2f} deg2",
     )
 
 
 def straight_error() -> float:
-    """Return the rms distance (mm) of our best linkage's curve from 13 points on a straight line of 100 mm.
-
-    The points are passed within 60 degrees of crank rotation.
-    """
+    """Return our best linkage's rms distance (mm) from 13 points of a line of 100 mm, passed within 60 deg of the crank."""
     points = ellipse(10.0, N)
     points[:13] = np.column_stack([np.linspace(0.30, 0.20, 13), np.full(13, 0.10)])
     weights = np.where(np.arange(N) < 13, 1.0, 0.0)
@@ -209,64 +185,55 @@ def straight_error() -> float:
     return 1e3 * float(np.sqrt(np.mean(found.evaluation.errors[:13] ** 2)))
 
 
-def _weighted() -> tuple[Statement, ...]:
+def _weighted() -> Iterator[Statement]:
     inside, outside = window_sums(PROBLEMS["rocker-weighted"].linkage)
     within = np.asarray(rocker_function(N, weighted=True).weights) > 1.0
     even_inside, even_outside = window_sums(PROBLEMS["rocker"].linkage)
-    return (
-        Statement(
-            "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
-            "the expense of the remaining portions of the output.",
-            text("6.4.2 B, L4973; also 6.2.2, L4247"),
-            "rms error of the weighted printed linkage within the window, to which both its ends belong, relative to the "
-            "function's range of 100 deg; its squared errors relative to those of the unweighted linkage, within the window "
-            f"and outside it; {N} crank angles",
-            f"{ALIKE:g}, the rule for *the same*, which we use for *closely*; at most 1 within the window, at least 1 "
-            "outside it",
-            (
-                at_most("rms error within the window", ALIKE, np.sqrt(inside / within.sum()) / 100.0),
-                at_most("squared errors within it", 1.0, inside / even_inside),
-                at_least("squared errors out of it", 1.0, outside / even_outside),
-            ),
-        ),
-        Statement(
-            "This procedure of weighting factors may be used when outputs in the form of straight lines are required by "
-            "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
-            text("6.4.2 B, L4981"),
-            "rms distance of our best linkage from 13 points of a line of 100 mm, which it passes within 60 deg of crank "
-            "rotation; all other points have the weight zero. The example is ours: timed, and within our limits for ellipse "
-            "(a)",
-            f"{100.0 * ALIKE:g} mm, {ALIKE:g} of the line's length, the rule for *straight*",
-            (at_most("distance", 100.0 * ALIKE, straight_error(), "mm"),),
-        ),
+    yield statement(
+        "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
+        "the expense of the remaining portions of the output.",
+        "6.4.2 B, L4973; also 6.2.2, L4247",
+        "rms error of the weighted printed linkage within the window, to which both its ends belong, relative to the "
+        "function's range of 100 deg; its squared errors relative to those of the unweighted linkage, within the window "
+        f"and outside it; {N} crank angles",
+        f"{ALIKE:g}, the rule for *the same*, which we use for *closely*; at most 1 within the window, at least 1 outside it",
+        at_most("rms error within the window", ALIKE, np.sqrt(inside / within.sum()) / 100.0),
+        at_most("squared errors within it", 1.0, inside / even_inside),
+        at_least("squared errors out of it", 1.0, outside / even_outside),
+    )
+    yield statement(
+        "This procedure of weighting factors may be used when outputs in the form of straight lines are required by "
+        "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
+        "6.4.2 B, L4981",
+        "rms distance of our best linkage from 13 points of a line of 100 mm, which it passes within 60 deg of crank rotation; "
+        "all other points have the weight zero. The example is ours: timed, and within our limits for ellipse (a)",
+        f"{100.0 * ALIKE:g} mm, {ALIKE:g} of the line's length, the rule for *straight*",
+        at_most("distance", 100.0 * ALIKE, straight_error(), "mm"),
     )
 
 
-def _paths() -> tuple[Statement, ...]:
+def _paths() -> Iterator[Statement]:
     ellipse_cm2 = pi * LONGER_CM * 5.0
     as_printed = (PROBLEMS[name].linkage_error(PROBLEMS[name].printed) for name in ("path-a", "path-b"))
-    return (
-        Statement(
-            "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
-            "as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
-            text("6.4.3, L5043"),
-            "area between the curves of the printed linkages, mended as in the next row: for (a) relative to the area of "
-            "its ellipse, for (b) relative to that for (a)",
-            f"{ALIKE:g}, the rule for *the same*, which we use for *tolerable*; at least 1, the rule for *greater*",
-            (
-                at_most("(a) over its ellipse", ALIKE, printed_error("path-a") / ellipse_cm2),
-                at_least("(b) over (a)", 1.0, printed_error("path-b") / printed_error("path-a")),
-            ),
-        ),
-        Statement(
-            "The error values involved in the output generation of outputs (a) and (b) are 2.3 and 12.6 [cm2] respectively.",
-            text("6.4.3, L5051"),
-            f"area between the curves of the printed linkages, {AREA_N} points on each, with X0 = 15.485 cm for (a) and l4 = "
-            f"184.443 cm for (b) (erratum 11), {ROUNDED}",
-            f"0.05 cm2, {HALF}",
-            (judge_stated_error("(a)", "2.3", "path-a", NO_DIGIT), judge_stated_error("(b)", "12.6", "path-b")),
-            "with the misprints the areas are {:.1f} and {:.1f} cm2".format(*as_printed),
-        ),
+    yield statement(
+        "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
+        "as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
+        "6.4.3, L5043",
+        "area between the curves of the printed linkages, mended as in the next row: for (a) relative to the area of "
+        "its ellipse, for (b) relative to that for (a)",
+        f"{ALIKE:g}, the rule for *the same*, which we use for *tolerable*; at least 1, the rule for *greater*",
+        at_most("(a) over its ellipse", ALIKE, printed_error("path-a") / ellipse_cm2),
+        at_least("(b) over (a)", 1.0, printed_error("path-b") / printed_error("path-a")),
+    )
+    yield statement(
+        "The error values involved in the output generation of outputs (a) and (b) are 2.3 and 12.6 [cm2] respectively.",
+        "6.4.3, L5051",
+        f"area between the curves of the printed linkages, {AREA_N} points on each, with X0 = 15.485 cm for (a) and l4 = "
+        f"184.443 cm for (b) (erratum 11), {ROUNDED}",
+        f"0.05 cm2, {HALF}",
+        judge_stated_error("(a)", "2.3", "path-a", NO_DIGIT),
+        judge_stated_error("(b)", "12.6", "path-b"),
+        why="with the misprints the areas are {:.1f} and {:.1f} cm2".format(*as_printed),
     )
 
 
@@ -280,10 +247,7 @@ def ratio_to_least(name: str) -> float:
 
 
 def ratios_to_least() -> dict[str, float]:
-    """Return the ratio of the printed linkage's error to ours for each figure.
-
-    The printed linkage has its misprint mended; ours has no link longer than the longest printed link.
-    """
+    """Return each printed linkage's error, mended, over that of ours, which has no longer link than the longest printed."""
     return {f"Fig {n}": ratio_to_least(row.problem) for n, row in TABLE.items()}
 
 
@@ -392,10 +356,7 @@ def linkages_panel(result: StudyResult) -> Panel:
 
 
 def draw_path(result: StudyResult, *, timed: bool) -> Figure:
-    """Draw the target with both coupler curves, their distances from the target, and the linkages.
-
-    The distances are drawn over the crank rotation if the path is timed, otherwise along the target.
-    """
+    """Draw the target with both coupler curves, their distances from it (over time if ``timed``), and the linkages."""
     place = result.columns["place on the target [deg]"]
     distances = Panel(
         x_label="crank rotation [deg]" if timed else "place on the ellipse, its parameter [deg]",
@@ -417,10 +378,7 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
 
 
 def window_sums(linkage: Linkage) -> tuple[float, float]:
-    """Return the sums (deg2) of the squared errors of the rocker function inside and outside the weighted window.
-
-    They are taken at 72 crank angles.
-    """
+    """Return the rocker function's squared errors at 72 crank angles (deg2): sums within the weighted window and outside."""
     task = rocker_function(N, weighted=True)
     within, squares = np.asarray(task.weights) > 1.0, DEG2_PER_RAD2 * evaluate(task, linkage).errors ** 2
     return float(squares[within].sum()), float(squares[~within].sum())
@@ -435,11 +393,7 @@ def mounted_solution() -> Solution:
 
 
 def rocker_columns(name: str) -> dict[str, FloatArray]:
-    """Return the data of a rocker function's figure.
-
-    They are the target, the rocker angles and their errors over a turn (deg), and the least error for each bound on the
-    transmission angle.
-    """
+    """Return a rocker function's target, angles, errors (deg), and least errors by the bound on the transmission angle."""
     p = PROBLEMS[name]
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}
@@ -515,7 +469,7 @@ def compute(number: str) -> StudyResult:
         claim=row.claim,
         assignment=row.reading,
         columns=pad_columns(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
-        statements=row.statements(),
+        statements=tuple(row.statements()),
         see=row.see,
     )
 

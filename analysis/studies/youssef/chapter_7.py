@@ -16,10 +16,9 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import Linkage, MachineSpec, SliderMotion
 from ...youssef import AccessibleArea, accessible_area
 from ..rules import READ
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 TARGET = "0.25"
 #: Crank rotations of the curves (rad).
@@ -100,28 +99,26 @@ def family() -> StudyResult:
         "choice. The crank turns fully from -1.5 to 1.5 except at +-0.5.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "If, however, a second input is established to which a controller is attached the output may be modified, "
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
-                text("7.0, L5203"),
+                "7.0, L5203",
                 f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2) "
                 f"for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3: the greatest at the {PRECISION} precision points, where "
                 "u = 0 (all our choice); then the greatest between each two of them, of which the least is listed",
                 f"1e-12 l3, for rounding errors; more than {READ:g} l3, the accuracy to which a graph can be read",
-                (
-                    at_most("at the precision points", 1e-12, kept, "l3"),
-                    at_least("between the precision points", READ, changed, "l3"),
-                ),
-                f"the variety is infinite, since a may have any value from {BETWEEN[0]:g} to {BETWEEN[-1]:g} l3",
+                at_most("at the precision points", 1e-12, kept, "l3"),
+                at_least("between the precision points", READ, changed, "l3"),
+                why=f"the variety is infinite, since a may have any value from {BETWEEN[0]:g} to {BETWEEN[-1]:g} l3",
             ),
-            Statement(
+            statement(
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "
                 "coupler-point by suitable combination of [theta2] and U.",
-                text("7.0, L5242"),
+                "7.0, L5242",
                 "area that P reaches, relative to the area within the outer boundary of the family, for three limits of U "
                 "(our choice), with the links assembled as in the plot",
                 "1 %, our choice, which exceeds the error of the areas",
-                tuple(
+                *(
                     near(
                         f"U from {low:g} to {high:g}",
                         1.0,
@@ -132,18 +129,19 @@ def family() -> StudyResult:
                     for (low, high), area in areas.items()
                 ),
             ),
-            Statement(
+            statement(
                 "Such 'isochronous' curves, which are arcs of circles centred at the corresponding fixed position, of B, can "
                 "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
                 "continuous variation of U is specified. Alternatively, they may be regarded as[] providing a starting point "
                 "from which a desired variation in U may be deduced.",
-                text("7.0, L5260-5272"),
+                "7.0, L5260-5272",
                 f"distance of P from B minus r, at {TURN.size - 1} crank angles and {ALONG.size} values of U from "
                 f"{1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}; then U deduced from the place of P on its arc, by the nearer root "
                 "of (7.14), minus U: the greatest size of each",
                 "1e-12 l3, for rounding errors, and 1e-6 l3 for U, which a square root gives",
-                (at_most("P off its arc", 1e-12, off_arc, "l3"), at_most("U deduced from P", 1e-6, off_slider, "l3")),
-                "once theta2 and U are given, P is one point of the arc; the other root of (7.14) puts P at the same point",
+                at_most("P off its arc", 1e-12, off_arc, "l3"),
+                at_most("U deduced from P", 1e-6, off_slider, "l3"),
+                why="once theta2 and U are given, P is one point of the arc; the other root of (7.14) puts P at the same point",
             ),
         ),
     )
@@ -156,11 +154,7 @@ def reached_area(low: float, high: float) -> AccessibleArea:
 
 
 def enclosed_area(low: float, high: float) -> float:
-    """Return the area that the coupler curves for U between two limits enclose together.
-
-    It is the union of the areas within 21 of these curves and of the area that P reaches, which covers the space between the 21
-    curves.
-    """
+    """Return the area that 21 coupler curves for U between two limits, and the area that P reaches, cover together."""
     import shapely
 
     found = reached_area(low, high)

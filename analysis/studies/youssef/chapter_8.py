@@ -7,17 +7,16 @@ full equations with the measured damping. The instruments (Fig 8.4, 8.6) are in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Turn
 from ..rules import ABOUT, ALIKE, SMALL
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult
 from . import rig_1, rig_2, rigs
 
@@ -35,7 +34,7 @@ class Turns:
     spring: str
     speeds: tuple[float, ...]
     claim: str
-    statements: Callable[[], tuple[Statement, ...]] = tuple
+    statements: Callable[[], Iterable[Statement]] = tuple
     assignment: str = ""
     rough: bool = False
     see: str = ""
@@ -49,7 +48,11 @@ class Turns:
         columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(rigs.slider(next(iter(turns.values())))))}
         columns |= {f"slider position u; {name} [cm]": rigs.slider(found) for name, found in turns.items()}
         return StudyResult(
-            claim=self.claim, assignment=self.assignment, columns=columns, statements=self.statements(), see=self.see
+            claim=self.claim,
+            assignment=self.assignment,
+            columns=columns,
+            statements=tuple(self.statements()),
+            see=self.see,
         )
 
     def draw(self, result: StudyResult) -> Figure:
@@ -84,7 +87,7 @@ TENS = "5 rpm, half a unit of the last digit of a speed in tens"
 NEAREST = "a stated speed is compared with the nearest speed that the rounding of the printed stiffness allows"
 
 
-def _periodic() -> tuple[Statement, ...]:
+def _periodic() -> Iterator[Statement]:
     """Judge Fig 8.7: one cycle of the slider takes one turn of the crank, at the speed of the figure and at all others."""
     stable = "below 1: then the motion of one crank cycle exists, and every motion near it tends to it"
     largest = [
@@ -97,108 +100,96 @@ def _periodic() -> tuple[Statement, ...]:
     ]
     shown = [(s, w) for s in "AB" for w in OF_FIGURES[s]]
     here = max(rigs.orbit(rigs.rig(s), w).largest for s, w in shown)
-    return (
-        Statement(
-            "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
-            text("8.4.1.1, L6437"),
-            "largest Floquet multiplier of the motion of one crank cycle, which is the factor by which a small departure "
-            "from it grows in a turn, at the 18 speeds of Fig 8.7 to 8.17",
-            stable,
-            (at_most("multiplier", 1.0, here),),
-            "a motion that repeats itself, and is not at rest, is oscillatory",
-        ),
-        Statement(
-            "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "
-            "motion of the slider is shown against the crank angle.",
-            text("8.4.1.1, L6439"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
-            "crank cycle.",
-            text("8.4.1.1, L6449"),
-            f"largest Floquet multiplier of the motion of one crank cycle, from {rigs.SLOWEST:g} rpm (our choice) to the "
-            "greatest speed that was run with each spring (L6555)",
-            stable,
-            tuple(largest),
-        ),
+    yield statement(
+        "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
+        "8.4.1.1, L6437",
+        "largest Floquet multiplier of the motion of one crank cycle, which is the factor by which a small departure "
+        "from it grows in a turn, at the 18 speeds of Fig 8.7 to 8.17",
+        stable,
+        at_most("multiplier", 1.0, here),
+        why="a motion that repeats itself, and is not at rest, is oscillatory",
+    )
+    yield statement(
+        "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "
+        "motion of the slider is shown against the crank angle.",
+        "8.4.1.1, L6439",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
+        "crank cycle.",
+        "8.4.1.1, L6449",
+        f"largest Floquet multiplier of the motion of one crank cycle, from {rigs.SLOWEST:g} rpm (our choice) to the "
+        "greatest speed that was run with each spring (L6555)",
+        stable,
+        *largest,
     )
 
 
-def _compared_a() -> tuple[Statement, ...]:
+def _compared_a() -> Iterator[Statement]:
     """Judge the statements on Fig 8.8 to 8.10, which compare theory with lost measurements."""
-    return (
-        Statement(
-            "As may be seen from Figs. (8.8), (8.9) and (8.10) the theoretical and experimental results are in good "
-            "agreement in both phase and amplitude.",
-            text("8.4.1.1, L6479"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "It can however be observed that while the phase is almost in total agreement the amplitude shows slight "
-            "variations.",
-            text("8.4.1.1, L6482"),
-            why=rigs.LOST,
-        ),
+    yield statement(
+        "As may be seen from Figs. (8.8), (8.9) and (8.10) the theoretical and experimental results are in good "
+        "agreement in both phase and amplitude.",
+        "8.4.1.1, L6479",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "It can however be observed that while the phase is almost in total agreement the amplitude shows slight variations.",
+        "8.4.1.1, L6482",
+        why=rigs.LOST,
     )
 
 
-def _compared_b() -> tuple[Statement, ...]:
+def _compared_b() -> Iterator[Statement]:
     """Judge the statements on Fig 8.11 to 8.13."""
-    return (
-        Statement(
-            "As may be seen the theoretical and experimental results are almost in total agreement in phase.",
-            text("8.4.1.1, L6524"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "The agreement in amplitude is, however, not as good but nevertheless reasonable.",
-            text("8.4.1.1, L6526"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "The experimental and theoretical results were compared for a number of other speeds below the natural "
-            "frequencies with both springs A and B and in all cases the agreement in phase was good and in amplitude "
-            "reasonable.",
-            text("8.4.1.1, L6533"),
-            why=f"{rigs.LOST}, and the other speeds are not named",
-        ),
+    yield statement(
+        "As may be seen the theoretical and experimental results are almost in total agreement in phase.",
+        "8.4.1.1, L6524",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "The agreement in amplitude is, however, not as good but nevertheless reasonable.",
+        "8.4.1.1, L6526",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "The experimental and theoretical results were compared for a number of other speeds below the natural frequencies "
+        "with both springs A and B and in all cases the agreement in phase was good and in amplitude reasonable.",
+        "8.4.1.1, L6533",
+        why=f"{rigs.LOST}, and the other speeds are not named",
     )
 
 
-def _fig_8_14() -> tuple[Statement, ...]:
+def _fig_8_14() -> Iterator[Statement]:
     natural, shown = {"A": "580", "B": "1160"}, OF_FIGURES["A"]
     of_four = sum(rigs.peaks(rigs.turn("A", speed)) == 4 for speed in shown)
     second = min(rigs.harmonic(rigs.turn("A", w), 2) / rigs.harmonic(rigs.turn("A", w), 1) for w in shown)
-    return (
-        Statement(
-            "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
-            "spring B in the region of 1160 RPM.",
-            text("8.4.1.2, L6551"),
-            "crank speed at the natural frequency, by the stiffness and the effective mass of the slider with the links "
-            "(its mean over a turn with u = 0)",
-            f"{100 * ABOUT:g} %, the rule for *in the region of*",
-            tuple(
-                near(f"spring {s}", stated, rigs.natural_speed(s), ABOUT * float(stated), "rpm")
-                for s, stated in natural.items()
-            ),
+    yield statement(
+        "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
+        "spring B in the region of 1160 RPM.",
+        "8.4.1.2, L6551",
+        "crank speed at the natural frequency, by the stiffness and the effective mass of the slider with the links "
+        "(its mean over a turn with u = 0)",
+        f"{100 * ABOUT:g} %, the rule for *in the region of*",
+        *(
+            near(f"spring {s}", stated, rigs.natural_speed(s), ABOUT * float(stated), "rpm")
+            for s, stated in natural.items()
         ),
-        Statement(
-            "They also show that a typical oscillation has four peaks indicating that, since the oscillations are periodic "
-            "in the crank cycle, more than one harmonic is present in the solution.",
-            text("8.4.1.2, L6579"),
-            f"number of the {len(shown)} speeds of Fig 8.8 to 8.10, 8.14 and 8.15 at which u has four maxima and minima "
-            "together in a turn, which is our reading of *peaks*. Then the second harmonic relative to the first, the least "
-            "of all these speeds",
-            f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*, so that the harmonic is seen",
-            (
-                at_least("speeds with four peaks", 0.5 * len(shown), of_four),
-                at_least("second harmonic over first", SMALL, second),
-            ),
-            "that the oscillations are periodic is judged at L6449",
-        ),
-        _amplitude_a(),
     )
+    yield statement(
+        "They also show that a typical oscillation has four peaks indicating that, since the oscillations are periodic "
+        "in the crank cycle, more than one harmonic is present in the solution.",
+        "8.4.1.2, L6579",
+        f"number of the {len(shown)} speeds of Fig 8.8 to 8.10, 8.14 and 8.15 at which u has four maxima and minima "
+        "together in a turn, which is our reading of *peaks*. Then the second harmonic relative to the first, the least "
+        "of all these speeds",
+        f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*, so that the harmonic is seen",
+        at_least("speeds with four peaks", 0.5 * len(shown), of_four),
+        at_least("second harmonic over first", SMALL, second),
+        why="that the oscillations are periodic is judged at L6449",
+    )
+    yield _amplitude_a()
 
 
 def _amplitude_a() -> Statement:
@@ -210,32 +201,30 @@ def _amplitude_a() -> Statement:
     soft = brentq(
         lambda stiffness: rigs.extrema_near_half("A", stiffness)[0] - least, *rigs.stiffness_range("A"), xtol=1.0
     )
-    return Statement(
+    return statement(
         "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
         "which it increases with increase of speed.",
-        text("8.4.1.2, L6734"),
+        "8.4.1.2, L6734",
         f"amplitude over the speed with spring A, from 240 rpm, the lowest speed of the figures; {NEAREST} (one digit)",
         f"{TENS}; 0.5 rpm for 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; for rises the sign alone",
-        (
-            at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
-            near(_rounded("speed of the maximum", tops), "290", np.clip(290.0, *tops), 5.0, "rpm"),
-            near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("A"), ALIKE),
-            at_most("greatest rise by 5 rpm, 300 to 345 rpm", 0.0, -_least_rise("A", range(345, 299, -5)), "cm"),
-            near(
-                f"speed of the minimum, the maximum at {least:g} rpm or more",
-                "345",
-                rigs.extrema_near_half("A", soft)[1],
-                unit="rpm",
-                why="no single stiffness gives both speeds",
-            ),
-            at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),
+        at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
+        near(_rounded("speed of the maximum", tops), "290", np.clip(290.0, *tops), 5.0, "rpm"),
+        near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("A"), ALIKE),
+        at_most("greatest rise by 5 rpm, 300 to 345 rpm", 0.0, -_least_rise("A", range(345, 299, -5)), "cm"),
+        near(
+            f"speed of the minimum, the maximum at {least:g} rpm or more",
+            "345",
+            rigs.extrema_near_half("A", soft)[1],
+            unit="rpm",
+            why="no single stiffness gives both speeds",
         ),
-        f"with the stiffness as printed, the maximum is at {top:.0f} rpm and the minimum at {low:.0f}",
+        at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),
+        why=f"with the stiffness as printed, the maximum is at {top:.0f} rpm and the minimum at {low:.0f}",
     )
 
 
-def _rounded(what: str, speeds: NDArray[np.float64]) -> str:
+def _rounded(what: str, speeds: FloatArray) -> str:
     """Return the name ``what`` of a speed, with the range of ``speeds`` (rpm) over the rounding of the printed stiffness."""
     return f"{what}; rounded {speeds.min():.0f} to {speeds.max():.0f}"
 
@@ -245,136 +234,115 @@ def _least_rise(spring: str, speeds: Sequence[float]) -> float:
     return float(np.diff([rigs.amplitude(rigs.turn(spring, speed)) for speed in speeds]).min())
 
 
-def _fig_8_15() -> tuple[Statement, ...]:
+def _fig_8_15() -> Iterator[Statement]:
     at_500 = rigs.turn("A", 500.0)
     shoulder = "the point of inflection has not reached the third peak; a shoulder is left"
     u = rigs.slider(at_500)
-    return (
-        Statement(
-            "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last peaks "
-            "coincide and become an inflection point and as the speed is increased further this inflection point coincides "
-            "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
-            text("8.4.1.2, L6724"),
-            "number of peaks in a turn, as at L6579; speed above which there are two instead of four. Then, at 500 rpm, the "
-            "number of points of inflection in a turn (a sine has two), and the second harmonic relative to the first",
-            f"none for the numbers; {TENS}; {ABOUT:g}, the rule for *nearly*, since we read *sinusoidal type* as nearly a "
-            "sine",
-            (
-                near("peaks at 240 rpm", "4", rigs.peaks(rigs.turn("A", 240.0)), 0.0),
-                near(
-                    "speed at which first and last peak meet",
-                    "450",
-                    rigs.speed_of_fewer_peaks("A", 400.0, 500.0),
-                    5.0,
-                    "rpm",
-                ),
-                near("peaks at 500 rpm", 2.0, rigs.peaks(at_500), 0.0),
-                near(
-                    "points of inflection at 500 rpm",
-                    2.0,
-                    rigs.count_sign_changes(np.diff(u, 2, prepend=u[-2])),
-                    0.0,
-                    why=shoulder,
-                ),
-                at_most(
-                    "second harmonic over first at 500 rpm",
-                    ABOUT,
-                    rigs.harmonic(at_500, 2) / rigs.harmonic(at_500, 1),
-                    why=shoulder,
-                ),
-            ),
+    yield statement(
+        "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last peaks "
+        "coincide and become an inflection point and as the speed is increased further this inflection point coincides "
+        "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
+        "8.4.1.2, L6724",
+        "number of peaks in a turn, as at L6579; speed above which there are two instead of four. Then, at 500 rpm, the "
+        "number of points of inflection in a turn (a sine has two), and the second harmonic relative to the first",
+        f"none for the numbers; {TENS}; {ABOUT:g}, the rule for *nearly*, since we read *sinusoidal type* as nearly a sine",
+        near("peaks at 240 rpm", "4", rigs.peaks(rigs.turn("A", 240.0)), 0.0),
+        near(
+            "speed at which first and last peak meet", "450", rigs.speed_of_fewer_peaks("A", 400.0, 500.0), 5.0, "rpm"
+        ),
+        near("peaks at 500 rpm", 2.0, rigs.peaks(at_500), 0.0),
+        near(
+            "points of inflection at 500 rpm",
+            2.0,
+            rigs.count_sign_changes(np.diff(u, 2, prepend=u[-2])),
+            0.0,
+            why=shoulder,
+        ),
+        at_most(
+            "second harmonic over first at 500 rpm",
+            ABOUT,
+            rigs.harmonic(at_500, 2) / rigs.harmonic(at_500, 1),
+            why=shoulder,
         ),
     )
 
 
-def _fig_8_16() -> tuple[Statement, ...]:
+def _fig_8_16() -> Iterator[Statement]:
     four = sum(rigs.peaks(rigs.turn("B", speed)) == 4 for speed in SPEEDS["B"])
     top = rigs.maximum_near_fraction("B", 2)[0]
     tops, _ = np.transpose([rigs.extrema_near_half("B", stiffness) for stiffness in rigs.stiffness_range("B")])
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     higher = {s: {w: rigs.overtones(rigs.turn(s, w)) for w in OF_FIGURES[s]} for s in "AB"}
-    return (
-        Statement(
-            "As in the case of spring A the oscillations are periodic and each oscillation has four peaks.",
-            text("8.4.1.2, L6750"),
-            f"number of the {len(SPEEDS['B'])} speeds of Fig 8.16 and 8.17 at which a turn has four peaks, as at L6579",
-            "none, since counts are exact",
-            (near("speeds with four peaks", float(len(SPEEDS["B"])), four, 0.0),),
-            "that they are periodic is judged at L6449",
+    yield statement(
+        "As in the case of spring A the oscillations are periodic and each oscillation has four peaks.",
+        "8.4.1.2, L6750",
+        f"number of the {len(SPEEDS['B'])} speeds of Fig 8.16 and 8.17 at which a turn has four peaks, as at L6579",
+        "none, since counts are exact",
+        near("speeds with four peaks", float(len(SPEEDS["B"])), four, 0.0),
+        why="that they are periodic is judged at L6449",
+    )
+    yield statement(
+        "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
+        "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
+        "8.4.1.2, L6752",
+        f"amplitude over the speed with spring B, from 500 rpm, the lowest speed of the figures; {NEAREST} (two digits)",
+        f"{TENS}; {ALIKE:g}, the rule for *the same*; for rises and falls the sign alone",
+        at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),
+        near(_rounded("speed of the maximum", tops), "580", np.clip(580.0, *tops), 5.0, "rpm"),
+        near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("B"), ALIKE),
+        at_most("greatest rise by 10 rpm, 570 to 710 rpm", 0.0, -_least_rise("B", range(710, 569, -10)), "cm"),
+        at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
+        why=f"with the stiffness as printed, the maximum is at {top:.0f} rpm",
+    )
+    yield statement(
+        "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "
+        "were observed at [w = wn/4, wn/3], where wn is the natural frequency.",
+        "8.4.1.2, L6770",
+        "maximum of the amplitude there minus the minimum that follows at a higher speed, relative to this minimum",
+        rigs.SEEN_IN_RECORDS,
+        *(
+            at_most(f"spring {s}, {part}, {rigs.natural_speed(s) / n:.0f} rpm", rigs.NOTICED, rigs.peak_rise(s, n))
+            for s, n, part in fractions
         ),
-        Statement(
-            "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
-            "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
-            text("8.4.1.2, L6752"),
-            f"amplitude over the speed with spring B, from 500 rpm, the lowest speed of the figures; {NEAREST} (two "
-            "digits)",
-            f"{TENS}; {ALIKE:g}, the rule for *the same*; for rises and falls the sign alone",
-            (
-                at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),
-                near(_rounded("speed of the maximum", tops), "580", np.clip(580.0, *tops), 5.0, "rpm"),
-                near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("B"), ALIKE),
-                at_most("greatest rise by 10 rpm, 570 to 710 rpm", 0.0, -_least_rise("B", range(710, 569, -10)), "cm"),
-                at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
-            ),
-            f"with the stiffness as printed, the maximum is at {top:.0f} rpm",
-        ),
-        Statement(
-            "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "
-            "were observed at [w = wn/4, wn/3], where wn is the natural frequency.",
-            text("8.4.1.2, L6770"),
-            "maximum of the amplitude there minus the minimum that follows at a higher speed, relative to this minimum",
-            rigs.SEEN_IN_RECORDS,
-            tuple(
-                at_most(f"spring {s}, {part}, {rigs.natural_speed(s) / n:.0f} rpm", rigs.NOTICED, rigs.peak_rise(s, n))
-                for s, n, part in fractions
-            ),
-            "there the third and the fourth harmonic meet the natural frequency",
-        ),
-        Statement(
-            "This suggested a slider solution based on the first and second[] harmonics, and that the third and higher "
-            "harmonics are small in comparison.",
-            text("8.4.1.2, L6774-6779"),
-            "greatest of the harmonics 3 to 6, relative to the greater of the first and second: the most at the nine speeds "
-            "of Fig 8.7 to 8.17 with each spring",
-            f"{SMALL:g}, the rule for *small*",
-            tuple(
-                at_most(f"spring {s}, {max(x, key=x.__getitem__):g} rpm", SMALL, max(x.values()))
-                for s, x in higher.items()
-            ),
-            "the greatest of them is the third harmonic; they are small only with spring A at 500 rpm, "
-            f"{higher['A'][500.0]:.3f}",
-        ),
+        why="there the third and the fourth harmonic meet the natural frequency",
+    )
+    yield statement(
+        "This suggested a slider solution based on the first and second[] harmonics, and that the third and higher "
+        "harmonics are small in comparison.",
+        "8.4.1.2, L6774-6779",
+        "greatest of the harmonics 3 to 6, relative to the greater of the first and second: the most at the nine speeds "
+        "of Fig 8.7 to 8.17 with each spring",
+        f"{SMALL:g}, the rule for *small*",
+        *(at_most(f"spring {s}, {max(x, key=x.__getitem__):g} rpm", SMALL, max(x.values())) for s, x in higher.items()),
+        why="the greatest of them is the third harmonic; they are small only with spring A at 500 rpm, "
+        f"{higher['A'][500.0]:.3f}",
     )
 
 
-def _fig_8_17() -> tuple[Statement, ...]:
+def _fig_8_17() -> Iterator[Statement]:
     meeting = {s: rigs.speed_of_fewer_peaks(s, *ends) for s, ends in {"A": (400.0, 500.0), "B": (800.0, 900.0)}.items()}
     of_natural = [speed / rigs.natural_speed(s) for s, speed in meeting.items()]
     late = [speed for speed in OF_FIGURES["B"] if speed >= 580.0]
     angles = [_fall_angle(rigs.turn("B", speed)) for speed in late]
-    return (
-        Statement(
-            "The four peaks in the oscillations show the same tendency as for spring A, i.e. the first and last peaks "
-            "coinciding and becoming an inflection point.",
-            text("8.4.1.2, L6760"),
-            "speed at which first and last peak meet, so that two of the four are left, relative to the natural frequency "
-            "(our measure): the value with spring B divided by that with spring A",
-            f"{ALIKE:g}, the rule for *the same*",
-            (near("spring B over A", 1.0, of_natural[1] / of_natural[0], ALIKE),),
-        ),
-        Statement(
-            "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted from "
-            "Figs. (8.11) to (8.13) and (8.16) to (8.17).",
-            text("8.4.1.2, L6764"),
-            "speed at which first and last peak meet with spring B. Then the crank angle from the last peak of a turn to "
-            f"the first of the next: its greatest change from one speed of the figures to the next, from {late[0]:g} rpm on, "
-            "where these two are the first and the last",
-            "above 800 rpm, the greatest speed that was run with this spring; for the change the sign alone",
-            (
-                at_least("speed at which they meet", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
-                at_most("greatest change of the angle", 0.0, np.diff(angles).max(), "deg"),
-            ),
-        ),
+    yield statement(
+        "The four peaks in the oscillations show the same tendency as for spring A, i.e. the first and last peaks "
+        "coinciding and becoming an inflection point.",
+        "8.4.1.2, L6760",
+        "speed at which first and last peak meet, so that two of the four are left, relative to the natural frequency "
+        "(our measure): the value with spring B divided by that with spring A",
+        f"{ALIKE:g}, the rule for *the same*",
+        near("spring B over A", 1.0, of_natural[1] / of_natural[0], ALIKE),
+    )
+    yield statement(
+        "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted from "
+        "Figs. (8.11) to (8.13) and (8.16) to (8.17).",
+        "8.4.1.2, L6764",
+        "speed at which first and last peak meet with spring B. Then the crank angle from the last peak of a turn to "
+        f"the first of the next: its greatest change from one speed of the figures to the next, from {late[0]:g} rpm on, "
+        "where these two are the first and the last",
+        "above 800 rpm, the greatest speed that was run with this spring; for the change the sign alone",
+        at_least("speed at which they meet", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
+        at_most("greatest change of the angle", 0.0, np.diff(angles).max(), "deg"),
     )
 
 

@@ -11,7 +11,7 @@ moves along a line through the shaft.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -31,7 +31,7 @@ from ...slider import TrackingController, TrackingResult, best_spring, inverse_d
 from ...synthesis import Linkage, MachineSpec, SecondCrank, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, READ, SEEN_FALL
-from ..statements import Case, Statement, at_least, at_most, text
+from ..statements import FloatArray, Statement, at_least, at_most, statement, unjudged
 from ..study import Study, StudyResult, pad_columns, result_curves
 from .chapter_6 import ratios_to_least
 from .chapter_7 import slider
@@ -112,7 +112,7 @@ def run(
 
 
 @cache
-def run_trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
+def run_trials(harmonics: int) -> tuple[FloatArray, ...]:
     """Run the trial cycles; return the deviation of the slider from the desired motion over the last turn of each run (m).
 
     After each cycle, the Fourier series of the deviation with this number of harmonics is subtracted from the stored motion.
@@ -143,13 +143,9 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
 
 
 def search_on_machine() -> tuple[float, float]:
-    """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex.
+    """Return the weighted errors (deg2) with the slider at rest and at the end of the search of the row at L5853."""
 
-    The unknowns are the mean and two harmonics of the slider motion. Returns the errors (deg2) with the slider at rest and at
-    the end of the search.
-    """
-
-    def error(c: NDArray[np.float64]) -> float:
+    def error(c: FloatArray) -> float:
         return error_on_machine(motion_of_plant(move_slider(FourierSeries(c[:3], np.append(0.0, c[3:])))))
 
     start = np.zeros(5)
@@ -166,10 +162,10 @@ def with_second_crank(name: str) -> Linkage:
     """
     printed = PROBLEMS[name].linkage
 
-    def linkage(x: NDArray[np.float64], ratio: int) -> Linkage:
+    def linkage(x: FloatArray, ratio: int) -> Linkage:
         return printed.with_pivot(SecondCrank(length=exp(x[0]) / CM_PER_METRE, ratio=ratio, phase=float(x[1])))
 
-    def error(x: NDArray[np.float64], ratio: int) -> float:
+    def error(x: FloatArray, ratio: int) -> float:
         return min(linkage_error(name, linkage(x, ratio)), REFUSED)
 
     found = []
@@ -200,7 +196,7 @@ def cam(series: FourierSeries) -> Cam:
     return Cam(1.0 / float(curvature.max()), r * np.exp(1j * angle))
 
 
-def rms(values: NDArray[np.float64]) -> float:
+def rms(values: FloatArray) -> float:
     """Return the root mean square of an array."""
     return float(np.sqrt(np.mean(values**2)))
 
@@ -229,79 +225,63 @@ def compute() -> StudyResult:
         columns |= {f"cam of {name}; x [cm]": found_cam.curve.real, f"cam of {name}; y [cm]": found_cam.curve.imag}
     return StudyResult(
         claim="The slider may be driven off-line, with feedback to a stored motion, or adaptively in trial cycles.",
-        assignment="The thesis computes none of them. In our example the links are steel bars of 20 by 5 mm, and a slider "
-        f"of {m.model.slider_mass:.1f} kg has a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction. It "
-        f"moves at {SPEED * 30.0 / pi:.0f} rpm by the best two harmonics of Fig 7.11, with feedback every "
-        f"{1e3 * PERIOD:g} ms and a bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's "
-        "model: it has twice the friction, coupler and slider are a tenth heavier, and there is a load of "
-        f"({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
+        assignment="The thesis computes none of them. In our example the links are steel bars of 20 by 5 mm, and a slider of "
+        f"{m.model.slider_mass:.1f} kg has a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction. It moves at "
+        f"{SPEED * 30.0 / pi:.0f} rpm by the best two harmonics of Fig 7.11, with feedback every {1e3 * PERIOD:g} ms and a "
+        f"bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's model: it has twice the friction, "
+        f"coupler and slider are a tenth heavier, and there is a load of ({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
         columns=pad_columns(columns),
         statements=(*judge_off_line(runs["feed-forward"], cams), *judge_on_line(runs["feedback"]), *judge_strategy()),
     )
 
 
-def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statement, ...]:
+def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> Iterator[Statement]:
     """Judge the statements on drives without feedback (7.1.1), given such a run and the cams of Fig 7.11 and 7.12."""
+    on_spring = steady_turn(table_3_1(1e6), TURN_RPM)
     fixed, one_harmonic = (
         linkage_error(ROCKER, moved) for moved in (PROBLEMS[ROCKER].linkage, rocker_motion(1).linkage)
     )
-    return (
-        Statement(
-            "An intermittent or continuous drive coupled to the primary input by means of direct mechanical connections, "
-            "an arrangement that is simple in principle but suffers from the defects of limited adaptability and "
-            "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
-            text("7.1.1 (a), L5301-5309"),
-            "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
-            "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a secondary "
-            "linkage, our example is a Scotch yoke: weighted error of the rocker function with one harmonic, relative to that "
-            "with the pivot fixed",
-            f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
-            (
-                *(at_least(f"cam of {name}", ROLLER, c.curvature, "cm") for name, c in cams.items()),
-                at_most("secondary linkage", 1.0 - ALIKE, one_harmonic / fixed),
-                Case(label="latch", computed=None, why="no example is given"),
-                Case(
-                    label="simple, limited adaptability, complications",
-                    computed=None,
-                    why="there is no measure of them",
-                ),
-            ),
-        ),
-        Statement(
-            "A passive mechanical system embodying elements such as springs or latches whose operation depend on the "
-            "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
-            "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
-            text("7.1.1 (b), L5311-5319"),
-            "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 "
-            "rpm. Only spring, damper and the forces of the links move the slider",
-            f"more than {READ:g}, the accuracy to which a graph can be read",
-            (
-                at_least("spring, continuous", READ, spring_range()),
-                Case(label="latch, intermittent", computed=None, why="no example is given"),
-                Case(label="advantages and disadvantages", computed=None, why="there is no measure of them"),
-            ),
-        ),
-        Statement(
-            "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
-            "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
-            "reproduction of a sufficiently accurate cyclic variation may be difficult.",
-            text("7.1.1 (c), L5321"),
-            "rms deviation of the slider, relative to its stroke, on the machine without feedback, under the force that the "
-            f"controller's model needs; over {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns, until the links "
-            "cannot be joined",
-            f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
-            (
-                at_least("no feedback", ALIKE, relative_deviation(open_loop)),
-                Case(label="versatility", computed=None, why="there is no measure of versatility"),
-            ),
-        ),
+    yield statement(
+        "An intermittent or continuous drive coupled to the primary input by means of direct mechanical connections, "
+        "an arrangement that is simple in principle but suffers from the defects of limited adaptability and "
+        "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
+        "7.1.1 (a), L5301-5309",
+        "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
+        "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a secondary "
+        "linkage, our example is a Scotch yoke: weighted error of the rocker function with one harmonic, relative to that "
+        "with the pivot fixed",
+        f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
+        *(at_least(f"cam of {name}", ROLLER, c.curvature, "cm") for name, c in cams.items()),
+        at_most("secondary linkage", 1.0 - ALIKE, one_harmonic / fixed),
+        unjudged("latch", "no example is given"),
+        unjudged("simple, limited adaptability, complications", "there is no measure of them"),
     )
-
-
-def spring_range() -> float:
-    """Return the range of u over l4 in the steady turn of chapter III, whose slider moves on a spring alone."""
-    mechanism = table_3_1(1e6)
-    return float(np.ptp(steady_turn(mechanism, TURN_RPM).slider_cm)) / (CM_PER_METRE * mechanism.rocker_length)
+    yield statement(
+        "A passive mechanical system embodying elements such as springs or latches whose operation depend on the "
+        "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
+        "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
+        "7.1.1 (b), L5311-5319",
+        "range of u over a steady turn, relative to l4, for Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 "
+        "rpm. Only spring, damper and the forces of the links move the slider",
+        f"more than {READ:g}, the accuracy to which a graph can be read",
+        at_least(
+            "spring, continuous", READ, np.ptp(on_spring.slider_cm) / (CM_PER_METRE * table_3_1(1e6).rocker_length)
+        ),
+        unjudged("latch, intermittent", "no example is given"),
+        unjudged("advantages and disadvantages", "there is no measure of them"),
+    )
+    yield statement(
+        "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
+        "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
+        "reproduction of a sufficiently accurate cyclic variation may be difficult.",
+        "7.1.1 (c), L5321",
+        "rms deviation of the slider, relative to its stroke, on the machine without feedback, under the force that the "
+        f"controller's model needs; over {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns, until the links "
+        "cannot be joined",
+        f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
+        at_least("no feedback", ALIKE, relative_deviation(open_loop)),
+        unjudged("versatility", "there is no measure of versatility"),
+    )
 
 
 def relative_deviation(found: TrackingResult) -> float:
@@ -309,7 +289,7 @@ def relative_deviation(found: TrackingResult) -> float:
     return rms(found.error) / float(np.ptp(machine().motion(np.linspace(0.0, 2.0 * pi, 721))))
 
 
-def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
+def judge_on_line(closed: TrackingResult) -> Iterator[Statement]:
     """Judge the statements on drives with feedback and on adaptive drives (7.1.2 to 7.3.1), given a run with feedback."""
     at_rest, least = search_on_machine()
     changes = ((CHANGED, SPEED), (LOAD, 0.5 * SPEED), (LOAD, 2.0 * SPEED))
@@ -317,79 +297,76 @@ def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
     cycles = [run_trials(n) for n in HARMONICS]
     left = [100.0 * rms(deviations[-1]) / rms(deviations[0]) for deviations in cycles]
     loaded, slower, faster = (error_on_machine(machine().motion, *change) / before for change in changes)
-    return (
-        Statement(
-            "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
-            "the actual motion is required to adhere by means of feedback.",
-            text("7.1.2, L5336"),
-            f"the same deviation on the same machine with feedback to the stored motion, over {TURNS:g} turns",
-            f"{ALIKE:g}, the rule for *the same*; one example is enough, since the sentence describes what feedback can do",
-            (at_most("feedback", ALIKE, relative_deviation(closed)),),
-        ),
-        Statement(
-            "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
-            "overall output and to record simultaneously and separately the values of the inputs. In practice this may be "
-            "accomplished with primary input operating in its normal mode. This establishes inter alia, the necessary cyclic "
-            "variation of the secondary input for reference model purposes, thus eliminating the prior calculation.",
-            text("7.1.2, L5346"),
-            why="no record is given",
-        ),
-        Statement(
-            "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
-            "appropriate mechanical response, which clearly establishes a limit of the range of application.",
-            text("7.1.2, L5360; for adaptive methods, L5370"),
-            why="neither a drive nor a speed is named",
-        ),
-        Statement(
-            "Trial cycles may then be completed in which the adjustable parameters of the drive are progressively changed "
-            "until a satisfactory correspondence is achieved. If the adjustments are made automatically on the basis of a "
-            "defined error criterion, the mechanism becomes self adaptive to its reference, and is thus a self-learning "
-            "device converging to the desired output.",
-            text("7.1.3, L5378-5388"),
-            why="neither the adjustment nor the criterion is stated. In our trial cycles (plot) the first "
-            f"{HARMONICS[0]} or {HARMONICS[1]} harmonics of the deviation are subtracted from the stored motion: after "
-            f"{TRIALS - 1} corrections {left[0]:.0f} or {left[1]:.0f} % of the rms deviation is left",
-        ),
-        Statement(
-            "Of these and other methods, the simplest and the most widely used is the mechanically coupled arrangement "
-            "of type (7.1.1).",
-            text("7.1.3, L5389"),
-            why="no survey of mechanisms is given, and there is no measure of *simplest*",
-        ),
-        Statement(
-            'The direct search method, however, may be used "on-line" and accommodate the dynamic '
-            "considerations into its structure.",
-            text("7.3.1, L5853; again L5867"),
-            "weighted error of the rocker function over the last turn of a run of the machine with feedback: the least in "
-            f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, relative to that with the slider at "
-            "rest, where the simplex begins",
-            f"{SEEN_FALL}; one example is enough for *may be*",
-            (at_most("search on the machine", 1.0 - ALIKE, least / at_rest),),
-        ),
-        Statement(
-            "With the variational method, any change in the operating conditions require a recalculation of optimum "
-            "conditions.",
-            text("7.3.1, L5871-5873"),
-            "*operating conditions* is read as load and speed. Error as in the row before, with feedback to the stored "
-            "motion of Fig 7.11 in place of a variational one (L5915), relative to the error before the change. The least "
-            "for three changes: three times the load, half the speed, and twice the speed",
-            f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires no recalculation refutes *any*",
-            (at_least("the least", 1.0 + ALIKE, min(loaded, slower, faster)),),
-            f"at half the speed the ratio is {slower:.3f}, at twice the speed {faster:.3f}. A motion calculated again would "
-            "be the same, since no equation of the method contains load or speed",
-        ),
-        Statement(
-            "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
-            "in an optimum manner, to the changes. Thus for automation purposes a heavy swing in favour of the direct search "
-            "method is justified.",
-            text("7.3.1, L5873-5881"),
-            why="there is no measure of *merely*, *in an optimum manner* and *heavy swing*; a search on the machine, which "
-            "does not depend on what changed before it, is judged at L5853",
-        ),
+    yield statement(
+        "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
+        "the actual motion is required to adhere by means of feedback.",
+        "7.1.2, L5336",
+        f"the same deviation on the same machine with feedback to the stored motion, over {TURNS:g} turns",
+        f"{ALIKE:g}, the rule for *the same*; one example is enough, since the sentence describes what feedback can do",
+        at_most("feedback", ALIKE, relative_deviation(closed)),
+    )
+    yield statement(
+        "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
+        "overall output and to record simultaneously and separately the values of the inputs. In practice this may be "
+        "accomplished with primary input operating in its normal mode. This establishes inter alia, the necessary cyclic "
+        "variation of the secondary input for reference model purposes, thus eliminating the prior calculation.",
+        "7.1.2, L5346",
+        why="no record is given",
+    )
+    yield statement(
+        "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
+        "appropriate mechanical response, which clearly establishes a limit of the range of application.",
+        "7.1.2, L5360; for adaptive methods, L5370",
+        why="neither a drive nor a speed is named",
+    )
+    yield statement(
+        "Trial cycles may then be completed in which the adjustable parameters of the drive are progressively changed "
+        "until a satisfactory correspondence is achieved. If the adjustments are made automatically on the basis of a "
+        "defined error criterion, the mechanism becomes self adaptive to its reference, and is thus a self-learning "
+        "device converging to the desired output.",
+        "7.1.3, L5378-5388",
+        why="neither the adjustment nor the criterion is stated. In our trial cycles (plot) the first "
+        f"{HARMONICS[0]} or {HARMONICS[1]} harmonics of the deviation are subtracted from the stored motion: after "
+        f"{TRIALS - 1} corrections {left[0]:.0f} or {left[1]:.0f} % of the rms deviation is left",
+    )
+    yield statement(
+        "Of these and other methods, the simplest and the most widely used is the mechanically coupled arrangement "
+        "of type (7.1.1).",
+        "7.1.3, L5389",
+        why="no survey of mechanisms is given, and there is no measure of *simplest*",
+    )
+    yield statement(
+        'The direct search method, however, may be used "on-line" and accommodate the dynamic '
+        "considerations into its structure.",
+        "7.3.1, L5853; again L5867",
+        "weighted error of the rocker function over the last turn of a run of the machine with feedback: the least in "
+        f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, relative to that with the slider at "
+        "rest, where the simplex begins",
+        f"{SEEN_FALL}; one example is enough for *may be*",
+        at_most("search on the machine", 1.0 - ALIKE, least / at_rest),
+    )
+    yield statement(
+        "With the variational method, any change in the operating conditions require a recalculation of optimum conditions.",
+        "7.3.1, L5871-5873",
+        "*operating conditions* is read as load and speed. Error as in the row before, with feedback to the stored "
+        "motion of Fig 7.11 in place of a variational one (L5915), relative to the error before the change. The least "
+        "for three changes: three times the load, half the speed, and twice the speed",
+        f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires no recalculation refutes *any*",
+        at_least("the least", 1.0 + ALIKE, min(loaded, slower, faster)),
+        why=f"at half the speed the ratio is {slower:.3f}, at twice the speed {faster:.3f}. A motion calculated again would "
+        "be the same, since no equation of the method contains load or speed",
+    )
+    yield statement(
+        "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
+        "in an optimum manner, to the changes. Thus for automation purposes a heavy swing in favour of the direct search "
+        "method is justified.",
+        "7.3.1, L5873-5881",
+        why="there is no measure of *merely*, *in an optimum manner* and *heavy swing*; a search on the machine, which "
+        "does not depend on what changed before it, is judged at L5853",
     )
 
 
-def judge_strategy() -> tuple[Statement, ...]:
+def judge_strategy() -> Iterator[Statement]:
     """Judge the statements on the strategy of search (7.4)."""
     fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
     fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
@@ -398,38 +375,32 @@ def judge_strategy() -> tuple[Statement, ...]:
         "Fig 7.11": linkage_error(ROCKER, readings(ROCKER)[0]) / least,
         "Fig 7.12": linkage_error(PATH, mended_path_linkage()) / least_path,
     }
-    return (
-        Statement(
-            "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
-            "five bar loop.",
-            text("7.4, L6013"),
-            "error with the slider moved by its best two harmonics within the limits of the next row, relative to that with "
-            "the pivot fixed, for the printed links, mended. Our example of another link is a second crank, geared to the "
-            "first (L6017), which moves the rocker pivot on a circle about its printed place; we take the best length, phase "
-            "and gear ratio of 1, -1, 2 and -2",
-            SEEN_FALL,
-            (
-                at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
-                at_most("slider, Fig 7.12", 1.0 - ALIKE, least_path / fixed_path),
-                at_most("another link, task of Fig 7.11", 1.0 - ALIKE, geared / fixed),
-                at_most("another link, task of Fig 7.12", 1.0 - ALIKE, geared_path / fixed_path),
-            ),
-        ),
-        Statement(
-            "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
-            "results in each case.",
-            text("7.4, L6026"),
-            "*optimum* is read as the least error that we find. Error of the printed four-bars, mended, relative to it, as at "
-            "L7026; error with the two printed series, as at L5935, relative to the least with as many harmonics and the same "
-            "links. At Fig 7.11 the slider stays within l1 of the printed pivot; at Fig 7.12 its stroke is at most "
-            f"{CM_PER_METRE * PATH_SEARCHES[2][1]:g} cm, more than ten times the printed one (our limits)",
-            f"{1.0 + ALIKE:g}, the rule for *the same*",
-            (
-                *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),
-                Case(label="a fifth link, further inputs", computed=None, why="no example is given"),
-            ),
-            "with still longer strokes, the printed series of Fig 7.12 is no optimum either",
-        ),
+    yield statement(
+        "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
+        "five bar loop.",
+        "7.4, L6013",
+        "error with the slider moved by its best two harmonics within the limits of the next row, relative to that with "
+        "the pivot fixed, for the printed links, mended. Our example of another link is a second crank, geared to the "
+        "first (L6017), which moves the rocker pivot on a circle about its printed place; we take the best length, phase "
+        "and gear ratio of 1, -1, 2 and -2",
+        SEEN_FALL,
+        at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
+        at_most("slider, Fig 7.12", 1.0 - ALIKE, least_path / fixed_path),
+        at_most("another link, task of Fig 7.11", 1.0 - ALIKE, geared / fixed),
+        at_most("another link, task of Fig 7.12", 1.0 - ALIKE, geared_path / fixed_path),
+    )
+    yield statement(
+        "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
+        "results in each case.",
+        "7.4, L6026",
+        "*optimum* is read as the least error that we find. Error of the printed four-bars, mended, relative to it, as at "
+        "L7026; error with the two printed series, as at L5935, relative to the least with as many harmonics and the same "
+        "links. At Fig 7.11 the slider stays within l1 of the printed pivot; at Fig 7.12 its stroke is at most "
+        f"{CM_PER_METRE * PATH_SEARCHES[2][1]:g} cm, more than ten times the printed one (our limits)",
+        f"{1.0 + ALIKE:g}, the rule for *the same*",
+        *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),
+        unjudged("a fifth link, further inputs", "no example is given"),
+        why="with still longer strokes, the printed series of Fig 7.12 is no optimum either",
     )
 
 

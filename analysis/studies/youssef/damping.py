@@ -5,7 +5,7 @@ A damper is given by omega_c = mu/(m4 + m5) (1/s).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from math import pi
@@ -30,7 +30,7 @@ from ...youssef import (
     slider_equation,
 )
 from ..rules import ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, listing, near, text
+from ..statements import Case, Statement, at_least, at_most, listing, near, statement
 from ..study import Study, StudyResult, pad_columns
 from .chapter_5 import COMPARED, SWEEPS, with_held_angles, with_same_ground
 from .linearised import with_crank
@@ -68,12 +68,6 @@ def with_damping(omega_c: float) -> Plane:
 
 
 @cache
-def damped_region(omega_c: float) -> Chart:
-    """Return the chart of the first region over lambda_k^2 and I4, with a damper omega_c (1/s)."""
-    return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
-
-
-@cache
 def removing_damper(motion: str, inertia_ratio: float) -> RemovingDamping:
     """Find the damper omega_c (1/s) that removes the first region at an inertia ratio, by one of the `MOTIONS`."""
 
@@ -105,18 +99,9 @@ def orbit_removing_damper(mechanisms: Iterable[FiveBarParameters]) -> float:
 
 
 def multiplier(inertia_ratio: float, omega_c: float, speed: float) -> float:
-    """Return the greatest modulus of the Floquet multipliers of the correct linear equation.
-
-    ``omega_c`` is the damper (1/s), ``speed`` the crank speed (rad/s).
-    """
+    """Return the right linear equation's greatest multiplier (modulus) with a damper (1/s) at a crank speed (rad/s)."""
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     return float(np.abs(hill_multipliers(found.homogeneous().stiffened(found.spring))).max())
-
-
-def region_width(found: Chart, value: float) -> float:
-    """Return the width in lambda_k^2 of the region in a chart at I4 = ``value``, zero if there is no region."""
-    roots = found.scan_line(value, samples=100).roots
-    return float(np.ptp(roots)) if len(roots) else 0.0
 
 
 def divide_by_mass(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
@@ -127,10 +112,7 @@ def divide_by_mass(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
 
 
 def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
-    """Return the equation (5.29) of chi, derived from the correct linear equation.
-
-    Here zeta is chi times the factor exp(-1/2 int psi1).
-    """
+    """Return the equation (5.29) of chi, zeta without the factor exp(-1/2 int psi1), from the right linear equation."""
     found = replace(slider_equation(chapter_4(inertia_ratio), crank_speed(0.25)), damping=lambda_c)
     whole = divide_by_mass(found.homogeneous(), ALL_HARMONICS)
     psi1, psi2 = whole.b, whole.c
@@ -139,10 +121,7 @@ def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEq
 
 
 def judge_shifts() -> tuple[Case, ...]:
-    """Judge how a damper of omega_c = `STATED` shifts regions 1 to 4 of (5.30) and changes their widths.
-
-    The values of I4 are those of `COMPARED`.
-    """
+    """Judge how a damper of `STATED` shifts and widens the regions 1 to 4 of (5.30), at the I4 of `COMPARED`."""
     found: list[tuple[float, float, float]] = []
     for ratio in COMPARED:
         for n, free in hill_regions(equation_without_factor(ratio, 0.0), 4).items():
@@ -160,10 +139,7 @@ def judge_shifts() -> tuple[Case, ...]:
 
 
 def error_of_factor(inertia_ratio: float) -> float:
-    """Return the greatest error of the multipliers by (5.28) and (5.29), with a damper of omega_c = `STATED`.
-
-    The multipliers of (5.29), times the factor of (5.28), are compared with those of the whole equation.
-    """
+    """Return the greatest error of (5.29)'s multipliers times the factor of (5.28), with a damper of omega_c = `STATED`."""
     region = hill_region(chapter_4(inertia_ratio))
     found = slider_equation(chapter_4(inertia_ratio, STATED), crank_speed(0.5 * (region.low + region.high)))
     psi1 = divide_by_mass(found.homogeneous(), ALL_HARMONICS).b
@@ -179,11 +155,9 @@ def farthest(values: Iterable[float]) -> float:
 
 
 def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
-    """Return the greatest change of the region's width from one damper to the next, negative if each change narrows the region.
-
-    Changes from a damper without a region do not count.
-    """
-    at = np.array([region_width(found, inertia_ratio) for found in charts.values()])
+    """Return the region's greatest growth in width from one damper to the next, up to the one that removes the region."""
+    edges = [found.scan_line(inertia_ratio, samples=100).roots for found in charts.values()]
+    at = np.array([np.ptp(roots) if len(roots) else 0.0 for roots in edges])
     return float(np.diff(at)[at[:-1] > 0.0].max())
 
 
@@ -214,84 +188,78 @@ def determinant_errors(harmonics: int, order: int = 2) -> dict[int, float]:
     }
 
 
-def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
+def judge_damper(charts: Mapping[float, Chart]) -> Iterator[Statement]:
     """Judge the statements on the regions with a damper, given their charts by omega_c (1/s)."""
     tips = [float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0]
     growth = max(narrowing(charts, ratio) for ratio in (*COMPARED, 2.0))
     crank, coupler, mechanism = (0.001, *SWEEPS["5.2"].values), SWEEPS["5.3"].values, chapter_4(1.5)
     fast = crank_speed(0.5 * boundary_stiffnesses(equation(mechanism), 1, count=1)[0].real)
-    return (
-        Statement(
-            "It is clearly seen that regions of instability of the above system will resemble those obtained for the "
-            "case of no damping but shifted by a small amount represented by the second order quantity of [1/4 "
-            "lambda_c^2 k0^2] in (5[.]30). However, all solutions of this equation are multiplied by the factor [exp(-1/2 int "
-            "psi1 dtheta)] as shown in (5.28).",
-            text("5.2.1, L3628-3639"),
-            f"regions 1 to 4 of (5.29) with omega_c = {STATED:g} 1/s and without a damper: shift of the middle in lambda_k^2 "
-            "k0 divided by the stated quantity; shift divided by lambda_k^2; width divided by that without a damper. Then the "
-            "Floquet multipliers of (5.29) times this factor over a turn, minus those of (5.27), in the middle of the first "
-            "region. The largest deviation of I4 = 0.5, 1 and 1.5 is listed; right linear equation",
-            f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*; 1e-6 for the multipliers, for "
-            "rounding errors",
-            (*judge_shifts(), at_most("multipliers", 1e-6, max(map(error_of_factor, COMPARED)))),
+    yield statement(
+        "It is clearly seen that regions of instability of the above system will resemble those obtained for the case of no "
+        "damping but shifted by a small amount represented by the second order quantity of [1/4 lambda_c^2 k0^2] in (5[.]30). "
+        "However, all solutions of this equation are multiplied by the factor [exp(-1/2 int psi1 dtheta)] as shown in (5.28).",
+        "5.2.1, L3628-3639",
+        f"regions 1 to 4 of (5.29) with omega_c = {STATED:g} 1/s and without a damper: shift of the middle in lambda_k^2 "
+        "k0 divided by the stated quantity; shift divided by lambda_k^2; width divided by that without a damper. Then the "
+        "Floquet multipliers of (5.29) times this factor over a turn, minus those of (5.27), in the middle of the first "
+        "region. The largest deviation of I4 = 0.5, 1 and 1.5 is listed; right linear equation",
+        f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*; 1e-6 for the multipliers, for "
+        "rounding errors",
+        *judge_shifts(),
+        at_most("multipliers", 1e-6, max(map(error_of_factor, COMPARED))),
+    )
+    yield statement(
+        "As would be expected the region is decreased in width as [omega_c] is increased.",
+        "5.3.2, L3915-3917",
+        "greatest growth of the width in lambda_k^2 from one damper to the next, up to the damper that removes the "
+        "region, at I4 = 0.5, 1, 1.5 and 2; for the true periodic motion",
+        SIGN,
+        at_most("", 0.0, growth),
+    )
+    yield statement(
+        "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
+        "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
+        "5.3.2, L3917-3921",
+        "least growth of the I4 at which the region begins, from one damper to the next (*to the right* on a plot over "
+        "I4, L3910); greatest omega_c that is needed to remove the region up to I4 = 1.5; for the true periodic motion",
+        "none: the sign decides, and whether the region is removed",
+        at_least("growth", 0.0, np.diff(tips).min()),
+        at_most("omega_c", "0.45", greatest_removing_damper("true orbit"), "1/s"),
+    )
+    yield statement(
+        "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
+        "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
+        "5.3.2, L3923-3929",
+        "omega_c that is needed to remove the region, for the true periodic motion, at the length that needs the most by "
+        "the right linear equation: of sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01, and of sigma3 = 0.8 to 1.2 in "
+        "steps of 0.025",
+        "none: the region is removed or it is not",
+        *(
+            at_most(name, "0.45", orbit_removing_damper(mechanisms), "1/s")
+            for name, mechanisms in (
+                ("Fig 5.2", map(with_crank, crank)),
+                ("Fig 5.3; angles held", map(with_held_angles, coupler)),
+                ("Fig 5.3; same ground link", map(with_same_ground, coupler)),
+            )
         ),
-        Statement(
-            "As would be expected the region is decreased in width as [omega_c] is increased.",
-            text("5.3.2, L3915-3917"),
-            "greatest growth of the width in lambda_k^2 from one damper to the next, up to the damper that removes the "
-            "region, at I4 = 0.5, 1, 1.5 and 2; for the true periodic motion",
-            SIGN,
-            (at_most("", 0.0, growth),),
-        ),
-        Statement(
-            "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
-            "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
-            text("5.3.2, L3917-3921"),
-            "least growth of the I4 at which the region begins, from one damper to the next (*to the right* on a plot over "
-            "I4, L3910); greatest omega_c that is needed to remove the region up to I4 = 1.5; for the true periodic motion",
-            "none: the sign decides, and whether the region is removed",
-            (
-                at_least("growth", 0.0, np.diff(tips).min()),
-                at_most("omega_c", "0.45", greatest_removing_damper("true orbit"), "1/s"),
-            ),
-        ),
-        Statement(
-            "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
-            "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
-            text("5.3.2, L3923-3929"),
-            "omega_c that is needed to remove the region, for the true periodic motion, at the length that needs the most by "
-            "the right linear equation: of sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01, and of sigma3 = 0.8 to 1.2 in "
-            "steps of 0.025",
-            "none: the region is removed or it is not",
-            tuple(
-                at_most(name, "0.45", orbit_removing_damper(mechanisms), "1/s")
-                for name, mechanisms in (
-                    ("Fig 5.2", map(with_crank, crank)),
-                    ("Fig 5.3; angles held", map(with_held_angles, coupler)),
-                    ("Fig 5.3; same ground link", map(with_same_ground, coupler)),
-                )
-            ),
-            "on the same ground link the region is wider",
-        ),
-        Statement(
-            "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
-            "making the linkage under study completely stable for all ranges of speeds.",
-            text("5.3.3 c, L3952-3958"),
-            "growth of the width as above. Then, by the right linear equation at I4 = 1.5: omega_c that removes regions 1 "
-            f"to 4, estimated from their widths; greatest multiplier beyond the zeroth boundary, at {fast:.0f} rad/s, with "
-            f"{STATED:g} 1/s (L3921) and with a thousand times as much",
-            f"{STATED:g} 1/s, the value of L3921, for omega_c; otherwise none: the sign and the stability decide",
-            (
-                at_most("growth of the width", 0.0, growth),
-                at_most("omega_c", STATED, max(removing_estimate(mechanism, n) for n in range(1, 5)), "1/s"),
-                *(at_most(f"multiplier; {d:g} 1/s", 1.0, multiplier(1.5, d, fast)) for d in (STATED, 1e3 * STATED)),
-            ),
-            "beyond the zeroth boundary the slider falls away; a damper slows it but does not stop it",
-        ),
+        why="on the same ground link the region is wider",
+    )
+    yield statement(
+        "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
+        "making the linkage under study completely stable for all ranges of speeds.",
+        "5.3.3 c, L3952-3958",
+        "growth of the width as above. Then, by the right linear equation at I4 = 1.5: omega_c that removes regions 1 "
+        f"to 4, estimated from their widths; greatest multiplier beyond the zeroth boundary, at {fast:.0f} rad/s, with "
+        f"{STATED:g} 1/s (L3921) and with a thousand times as much",
+        f"{STATED:g} 1/s, the value of L3921, for omega_c; otherwise none: the sign and the stability decide",
+        at_most("growth of the width", 0.0, growth),
+        at_most("omega_c", STATED, max(removing_estimate(mechanism, n) for n in range(1, 5)), "1/s"),
+        *(at_most(f"multiplier; {d:g} 1/s", 1.0, multiplier(1.5, d, fast)) for d in (STATED, 1e3 * STATED)),
+        why="beyond the zeroth boundary the slider falls away; a damper slows it but does not stop it",
     )
 
 
-def judge_determinant() -> tuple[Statement, ...]:
+def judge_determinant() -> Iterator[Statement]:
     """Judge the statements on the method (5.31) to (5.35) and on its program."""
     dampers = {f"omega_c = {DAMPERS[2]:g} 1/s": DAMPERS[2], "without a damper, as in 5.3.3 e": 0.0}
     ways: dict[str, tuple[Variant, Callable[[FiveBarParameters], Region]]] = {
@@ -307,69 +275,65 @@ def judge_determinant() -> tuple[Statement, ...]:
             sizes = [abs(getattr(region, end) - getattr(other, end)) for region, other in pairs]
             apart[f"{name}; {end}"] = max(sizes) / scale
             shares += [size / region.width for size, (region, _) in zip(sizes, pairs)]
-    return (
-        Statement(
-            "The values of [omega] and s2 that satisfy equations (5.35) determine the boundaries of the unstable regions.",
-            text("5.2.2, eqs (5.33) to (5.35), L3717-3719"),
-            "greatest real part s1 of Lambda outside the first region: half a width away from it, and at lambda_k^2 = 0.2 "
-            "and 0.35, for I4 = 0.5, 1 and 1.5; right linear equation. Where s1 is 0, some s2 satisfies (5.35)",
-            "below 0 by more than 1e-9, above rounding errors",
-            tuple(at_most(name, -1e-9, growth_outside_region(omega_c)) for name, omega_c in dampers.items()),
-            "without a damper s1 is 0 at every stable speed, not only at the boundaries",
+    yield statement(
+        "The values of [omega] and s2 that satisfy equations (5.35) determine the boundaries of the unstable regions.",
+        "5.2.2, eqs (5.33) to (5.35), L3717-3719",
+        "greatest real part s1 of Lambda outside the first region: half a width away from it, and at lambda_k^2 = 0.2 "
+        "and 0.35, for I4 = 0.5, 1 and 1.5; right linear equation. Where s1 is 0, some s2 satisfies (5.35)",
+        "below 0 by more than 1e-9, above rounding errors",
+        *(at_most(name, -1e-9, growth_outside_region(omega_c)) for name, omega_c in dampers.items()),
+        why="without a damper s1 is 0 at every stable speed, not only at the boundaries",
+    )
+    yield statement(
+        "For a particular mechanism the method is capable of giving all the boundaries of the unstable regions without "
+        "any extra work.",
+        "5.2.2, L3730-3734",
+        "boundaries by (5.35) cut after the ninth term (L3930) minus those without any cut, relative to the region's "
+        "width. The coefficients have two harmonics, as in (4.29), or all harmonics. The four regions that nine terms "
+        "have; right linear equation, divided by M as (5.27), I4 = 1, without a damper",
+        f"{SMALL:g}, the rule for *small*",
+        *(
+            at_most(f"region {n}; {name}", SMALL, x)
+            for name, harmonics in (("as in (4.29)", LISTED_HARMONICS), ("all harmonics", ALL_HARMONICS))
+            for n, x in determinant_errors(harmonics).items()
         ),
-        Statement(
-            "For a particular mechanism the method is capable of giving all the boundaries of the unstable regions without "
-            "any extra work.",
-            text("5.2.2, L3730-3734"),
-            "boundaries by (5.35) cut after the ninth term (L3930) minus those without any cut, relative to the region's "
-            "width. The coefficients have two harmonics, as in (4.29), or all harmonics. The four regions that nine terms "
-            "have; right linear equation, divided by M as (5.27), I4 = 1, without a damper",
-            f"{SMALL:g}, the rule for *small*",
-            tuple(
-                at_most(f"region {n}; {name}", SMALL, x)
-                for name, harmonics in (("as in (4.29)", LISTED_HARMONICS), ("all harmonics", ALL_HARMONICS))
-                for n, x in determinant_errors(harmonics).items()
-            ),
-            "it does need extra work: more harmonics for the third region, and more terms for the fourth",
+        why="it does need extra work: more harmonics for the third region, and more terms for the fourth",
+    )
+    yield statement(
+        "The computer orientated method provided a fast method for solving the stability problem.",
+        "5.3.3 d, L3960-3962",
+        why="no times are given",
+    )
+    yield statement(
+        "The computer orientated method gave results which are in good agreement with the perturbation method; "
+        "see the outer boundary of fig. (5.4) and fig. (5.1).",
+        "5.3.3 e, L3964-3968",
+        "outer boundaries of the first region, those without a damper: by (5.35) minus by (5.16), relative to the least "
+        "scale of their graph, from 1/4 at I4 = 0 to the highest boundary at I4 = 1.5. Right linear equation, and "
+        "listings of appendices 4 and 3; the greatest difference of I4 = 0.5, 1 and 1.5",
+        f"{ALIKE:g}, the rule for *the same*, which we use for *good agreement* as at L6865",
+        *(at_most(name, ALIKE, x) for name, x in apart.items()),
+        why=f"but relative to the region's width, the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
+    )
+    yield statement(
+        "THIS PROG. INVIST[I]GATES STABILITY IN[ ]PRESENCE [O]F DAMPING",
+        listing("appendix 4, L8698"),
+        "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation "
+        "of the listing (its cut after nine terms does not change these digits) and for the true periodic motion",
+        "0.0005 1/s, the accuracy of the listing's value",
+        near(
+            "",
+            f"{greatest_removing_damper('listing of appendix 4'):.3f}",
+            greatest_removing_damper("true orbit"),
+            unit="1/s",
         ),
-        Statement(
-            "The computer orientated method provided a fast method for solving the stability problem.",
-            text("5.3.3 d, L3960-3962"),
-            why="no times are given",
-        ),
-        Statement(
-            "The computer orientated method gave results which are in good agreement with the perturbation method; "
-            "see the outer boundary of fig. (5.4) and fig. (5.1).",
-            text("5.3.3 e, L3964-3968"),
-            "outer boundaries of the first region, those without a damper: by (5.35) minus by (5.16), relative to the least "
-            "scale of their graph, from 1/4 at I4 = 0 to the highest boundary at I4 = 1.5. Right linear equation, and "
-            "listings of appendices 4 and 3; the greatest difference of I4 = 0.5, 1 and 1.5",
-            f"{ALIKE:g}, the rule for *the same*, which we use for *good agreement* as at L6865",
-            tuple(at_most(name, ALIKE, x) for name, x in apart.items()),
-            f"but relative to the region's width, the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
-        ),
-        Statement(
-            "THIS PROG. INVIST[I]GATES STABILITY IN[ ]PRESENCE [O]F DAMPING",
-            listing("appendix 4, L8698"),
-            "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation "
-            "of the listing (its cut after nine terms does not change these digits) and for the true periodic motion",
-            "0.0005 1/s, the accuracy of the listing's value",
-            (
-                near(
-                    "",
-                    f"{greatest_removing_damper('listing of appendix 4'):.3f}",
-                    greatest_removing_damper("true orbit"),
-                    unit="1/s",
-                ),
-            ),
-            "the listing's regions are too wide (errata 2, 16, 17, 20)",
-        ),
+        why="the listing's regions are too wide (errata 2, 16, 17, 20)",
     )
 
 
 def compute() -> StudyResult:
     """Compute the boundaries of the first region with each damper, and the damper that removes the region at each I4."""
-    charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
+    charts = {d: chart(orbit_test(with_damping(d), -1), BOX, lines=(0, 4), samples=100) for d in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:
         columns[f"removing omega_c; {motion} [1/s]"] = np.array(

@@ -7,20 +7,20 @@ from the closure of the loop. A launch, section 3.2.2, is a motion from rest und
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from ...figures import Figure, Panel, plot_curves
 from ...run import Hamming
 from ...units import CM_PER_METRE
 from ..rules import SMALL
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, near, statement, within
 from ..study import Study, StudyResult, result_curves
 from .integrators import CLASSICAL, SLIP, order_of_series, runge_kutta, spurious_root, stable_steps
 from .multipliers import OMEGA, ROUNDING, TABLE, TORQUE, chapter_2_statements, closed_loop_state, solve_multipliers
@@ -39,13 +39,13 @@ STEP = 1e-3
 START_ERROR, UNIT = 1e-5, 1e-6
 
 
-def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def all_derivatives(t: float, y: FloatArray) -> FloatArray:
     """Return y' of y = (th3, th4, u, th3', th4', u') at constant crank speed: the first approach of section 3.1."""
     w = solve_multipliers((OMEGA * t, *y[:3]), (OMEGA, *y[3:]))
     return np.array([*y[3:], w[5], w[4], w[3]])
 
 
-def slider_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def slider_derivatives(t: float, y: FloatArray) -> FloatArray:
     """Return y' of y = (u, u'), with th3 and th4 from the closure of the loop: the second approach of section 3.1."""
     return np.array([y[1], solve_multipliers(*closed_loop_state(OMEGA * t, y[0], OMEGA, y[1]))[3]])
 
@@ -58,11 +58,11 @@ class Integrated(NamedTuple):
     has the times (s) and u (cm).
     """
 
-    times: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    times: FloatArray
+    gap: FloatArray
     errors: tuple[float, float]
     unseen: float
-    slider: tuple[NDArray[np.float64], NDArray[np.float64]]
+    slider: tuple[FloatArray, FloatArray]
 
     @property
     def hidden(self) -> float:
@@ -98,13 +98,13 @@ def bar_torque(crank: float, power: int = 1) -> float:
     return float(TORQUE * max(1.0 - crank, 0.0) ** power)
 
 
-def launch_derivatives(t: float, y: NDArray[np.float64], power: int) -> NDArray[np.float64]:
+def launch_derivatives(t: float, y: FloatArray, power: int) -> FloatArray:
     """Return y' of y = (q, q') in a launch: the first approach of 3.1."""
     w = solve_multipliers(y[:4], y[4:], bar_torque(y[0], power))
     return np.array([*y[4:], w[0], *w[:2:-1]])
 
 
-def reduced_launch_derivatives(t: float, y: NDArray[np.float64], power: int) -> NDArray[np.float64]:
+def reduced_launch_derivatives(t: float, y: FloatArray, power: int) -> FloatArray:
     """Return y' of y = (th2, u, th2', u') in a launch with the loop closed by its kinematics: the second approach."""
     w = solve_multipliers(*closed_loop_state(*y), bar_torque(y[0], power))
     return np.array([*y[2:], w[0], w[3]])
@@ -131,9 +131,9 @@ def integrate_launch(step: float, power: int = 1) -> tuple[float, tuple[float, f
 
 
 @cache
-def exact_launch(power: int = 1) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def exact_launch(power: int = 1) -> Callable[[FloatArray], FloatArray]:
     """Return a function that gives (th2, u, th2', u') in SI at times (s) of a launch, accurate to 1e-9 cm."""
-    solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    solution: Callable[[FloatArray], FloatArray]
     options = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13, "dense_output": True, "args": (power,)}
     solution = solve_ivp(reduced_launch_derivatives, (0.0, STOP), np.zeros(4), **options).sol
     return solution
@@ -151,25 +151,19 @@ def judge_closure() -> tuple[Case, ...]:
         f"{KINK}. Under a torque that ends smoothly, T0 (1 - theta2)^{SMOOTH}, the closure is {gap / errors[0]:.1f} times the "
         f"error, {_step(STEP)}"
     )
-    return tuple(Case(label=label, computed=x, lower=1.0, upper=100.0, why=why) for label, x in shown.items())
+    return tuple(within(label, 1.0, 100.0, x, why=why) for label, x in shown.items())
 
 
 @cache
-def exact_motion(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def exact_motion(start: float = 0.0) -> Callable[[FloatArray], FloatArray]:
     """Return a function of times (s) that gives (u, u') in SI, accurate to rounding, from rest at u = ``start`` (m)."""
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
-    solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    solution: Callable[[FloatArray], FloatArray]
     solution = solve_ivp(slider_derivatives, (0.0, STOP), [start, 0.0], **options).sol
     return solution
 
 
-def change_on_halving(step: float) -> float:
-    """Return the greatest change of u (cm) if the step of the second approach is halved."""
-    (times, u), (finer, other) = (integrate_both(h).slider for h in (step, 0.5 * step))
-    return float(np.abs(u - np.interp(times, finer, other)).max())
-
-
-def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.float64], ...]:
+def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[FloatArray, ...]:
     """Return estimated errors of u, true errors of u, and roundings of u (all in m), for single steps of Hamming's method.
 
     The estimate is 9/121 (p - c). Each step has the length `STEP` and begins with the exact motion from rest at ``start`` (m).
@@ -196,45 +190,29 @@ def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.
 @cache
 def integrate_by_runge_kutta(
     step: float, first: bool = False, stages: tuple[tuple[float, float], ...] = CLASSICAL
-) -> NDArray[np.float64]:
-    """Integrate the motion by Runge-Kutta's method; return the state after each step.
-
-    The equations are those of the second approach of section 3.1, or of the first if ``first``.
-    """
+) -> FloatArray:
+    """Integrate by Runge-Kutta's method and the second approach of 3.1, or the ``first``; return the state at each step."""
     q, qd = closed_loop_state(0.0, 0.0, OMEGA, 0.0)
     f, start = (all_derivatives, [*q[1:], *qd[1:]]) if first else (slider_derivatives, [0.0, 0.0])
     n = round(STOP / step)
     return runge_kutta(f, start, STOP / n, n, stages)
 
 
-def integration_error(u: NDArray[np.float64]) -> float:
+def integration_error(u: FloatArray) -> float:
     """Return the greatest error (cm) of u (m), given at evenly spaced times from 0 to `STOP`."""
     return CM_PER_METRE * float(np.abs(u - exact_motion()(np.linspace(0.0, STOP, len(u)))[0]).max())
 
 
 def runge_kutta_estimate_ratio(step: float) -> float:
-    """Return the greatest error of u by Runge-Kutta's method relative to its estimate by halving the step.
-
-    The estimate is the greatest change of u divided by 1 - 1/16. The motion is integrated by the second approach.
-    """
+    """Return u's greatest error by Runge-Kutta's method, second approach, over its estimate by halving the step."""
     u, halved = integrate_by_runge_kutta(step)[:, 0], integrate_by_runge_kutta(0.5 * step)[::2, 0]
     return integration_error(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
 
 
-def slip_ratio(step: float) -> float:
-    """Return the greatest closure error divided by the greatest error of u if Runge-Kutta's method has the wrong stages `SLIP`.
-
-    The motion is integrated by the first approach.
-    """
-    states = integrate_by_runge_kutta(step, True, SLIP)
-    crank = OMEGA * np.linspace(0.0, STOP, len(states))
-    return float(closure_error(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
-
-
-def closure_error(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def closure_error(q: FloatArray) -> FloatArray:
     """Return the closure error (cm), eq (2.1), for each column of q, shape (4, n)."""
     lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
-    gap: NDArray[np.float64] = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
+    gap: FloatArray = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
     return gap
 
 
@@ -269,74 +247,68 @@ def _step(step: float) -> str:
     return f"step {1e3 * step:g} ms"
 
 
-def _closure_statements() -> list[Statement]:
+def _closure_statements() -> Iterator[Statement]:
     """Judge section 3.1: whether the closure of the loop shows the error."""
     found = {_step(step): integrate_both(step) for step in STEPS}
     long, label = integrate_both(LONG_STEP), _step(LONG_STEP)
     travel = CM_PER_METRE * float(np.ptp(exact_motion()(np.linspace(0.0, STOP, 2001))[0]))
-    return [
-        Statement(
-            "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
-            "closure.",
-            text("3.1, L1744-1748; with L1772-1782"),
-            "greatest failure of closure divided by the greatest error of u. All second derivatives are integrated by "
-            "Hamming's method, at 420 rpm and in a launch. For *debugging*, the same at 420 rpm by Runge-Kutta's method "
-            "with a slip that we put in: its last stage is at mid-step",
-            "1 to 100, our choice: the closure must show the error, and must not be more than a hundred times as large",
-            (*judge_closure(), Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0)),
-            "a large failure does show an error, as L1772-1782 says, since it is nowhere more than a hundred times as large",
+    (times, u), (finer, other) = (integrate_both(h).slider for h in (LONG_STEP, 0.5 * LONG_STEP))
+    halving = float(np.abs(u - np.interp(times, finer, other)).max())
+    states = integrate_by_runge_kutta(STEP, True, SLIP)
+    slipped = np.array([OMEGA * np.linspace(0.0, STOP, len(states)), *states[:, :3].T])
+    slip = float(closure_error(slipped).max()) / integration_error(states[:, 2])
+    yield statement(
+        "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
+        "closure.",
+        "3.1, L1744-1748; with L1772-1782",
+        "greatest failure of closure divided by the greatest error of u. All second derivatives are integrated by "
+        "Hamming's method, at 420 rpm and in a launch. For *debugging*, the same at 420 rpm by Runge-Kutta's method "
+        "with a slip that we put in: its last stage is at mid-step",
+        "1 to 100, our choice: the closure must show the error, and must not be more than a hundred times as large",
+        *judge_closure(),
+        within(f"a slip; {_step(STEP)}", 1.0, 100.0, slip),
+        why="a large failure does show an error, as L1772-1782 says, since it is nowhere more than a hundred times as large",
+    )
+    yield statement(
+        "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "
+        "checks, only if used in conjunction with the first approach.",
+        "3.1, L1748-1755",
+        "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, divided "
+        "by its failure of closure, to one digit, since this failure is a rounding error; Hamming's method, at 420 rpm",
+        "more than 100, our choice as above: then the check shows nothing of the error",
+        *(at_least(name, 100.0, run.hidden) for name, run in found.items()),
+    )
+    yield statement(
+        "[L]arge errors may be involved in the numerical integrations yet they are not realised by the designer "
+        "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
+        "to indicate whether the solution is accurate.",
+        "3.1, L1763-1772",
+        f"greatest error of u by the second approach as in the row before, with a step of {1e3 * LONG_STEP:g} ms (our choice). "
+        "It is divided by the range of u, by the failure of closure, and by the greatest change of u when the step is halved",
+        f"more than {SMALL:g}, the rule for *small*; more than 100, our choice as above, for the two checks. One simple "
+        "check that shows the error refutes *no*",
+        at_least(f"large error; {label}", SMALL, long.errors[1] / travel),
+        at_least(f"not seen in the closure; {label}", 100.0, long.hidden),
+        at_least(
+            f"not seen on halving; {label}", 100.0, long.errors[1] / halving, why="halving the step shows the error"
         ),
-        Statement(
-            "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "
-            "checks, only if used in conjunction with the first approach.",
-            text("3.1, L1748-1755"),
-            "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, "
-            "divided by its failure of closure, to one digit, since this failure is a rounding error; Hamming's method, at 420 "
-            "rpm",
-            "more than 100, our choice as above: then the check shows nothing of the error",
-            tuple(at_least(name, 100.0, run.hidden) for name, run in found.items()),
+    )
+    yield statement(
+        "This [to integrate all the second order derivatives and bound the errors in loop closure, before the second "
+        "approach is taken] will ensure that the integration method is reliable and leads to accurate results.",
+        "3.1, L1796-1798",
+        "greatest error of u by the second approach divided by the greatest failure of closure by the first approach with the "
+        "same step. Hamming's method, at 420 rpm and in the launch, which are two of *the coming solutions* (L1784)",
+        "at most 1, our choice: then a bound on the failure of closure also bounds the error",
+        *(at_most(name, 1.0, run.errors[1] / run.gap.max()) for name, run in found.items()),
+        *(
+            at_most(f"launch; {_step(step)}", 1.0, errors[1] / gap, why=KINK)
+            for step, (gap, errors) in ((step, integrate_launch(step)) for step in STEPS)
         ),
-        Statement(
-            "[L]arge errors may be involved in the numerical integrations yet they are not realised by the designer "
-            "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
-            "to indicate whether the solution is accurate.",
-            text("3.1, L1763-1772"),
-            f"greatest error of u by the second approach as in the row before, with a step of {1e3 * LONG_STEP:g} ms (our "
-            "choice). It is divided by the range of u, by the failure of closure, and by the greatest change of u when the "
-            "step is halved",
-            f"more than {SMALL:g}, the rule for *small*; more than 100, our choice as above, for the two checks. One simple "
-            "check that shows the error refutes *no*",
-            (
-                at_least(f"large error; {label}", SMALL, long.errors[1] / travel),
-                at_least(f"not seen in the closure; {label}", 100.0, long.hidden),
-                at_least(
-                    f"not seen on halving; {label}",
-                    100.0,
-                    long.errors[1] / change_on_halving(LONG_STEP),
-                    why="halving the step shows the error",
-                ),
-            ),
-        ),
-        Statement(
-            "This [to integrate all the second order derivatives and bound the errors in loop closure, before the second "
-            "approach is taken] will ensure that the integration method is reliable and leads to accurate results.",
-            text("3.1, L1796-1798"),
-            "greatest error of u by the second approach divided by the greatest failure of closure by the first approach "
-            "with the same step. Hamming's method, at 420 rpm and in the launch, which are two of *the coming solutions* "
-            "(L1784)",
-            "at most 1, our choice: then a bound on the failure of closure also bounds the error",
-            (
-                *(at_most(name, 1.0, run.errors[1] / run.gap.max()) for name, run in found.items()),
-                *(
-                    at_most(f"launch; {_step(step)}", 1.0, errors[1] / gap, why=KINK)
-                    for step, (gap, errors) in ((step, integrate_launch(step)) for step in STEPS)
-                ),
-            ),
-        ),
-    ]
+    )
 
 
-def _one_step_statements() -> list[Statement]:
+def _one_step_statements() -> Iterator[Statement]:
     """Judge section 2.4 on the Runge-Kutta methods and on series."""
     halved = max(max(ratio, 1.0 / ratio) for ratio in map(runge_kutta_estimate_ratio, STEPS))
     classical, hamming = stable_steps(1j)
@@ -350,72 +322,62 @@ def _one_step_statements() -> list[Statement]:
         for step in (STEPS[1], STEPS[-1])
     }
     used = len(CLASSICAL)
-    return [
-        Statement(
-            "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
-            "errors; this makes them highly susceptible to numerical instabilities ...",
-            text("2.4, L1334-1340"),
-            "factor between the greatest error of u and its estimate, which is the change when the step is halved, divided "
-            "by 1 - 1/16. Second approach, classical method, 420 rpm, the greatest factor for steps of 4, 2, 1 and 0.5 ms. "
-            "Then the greatest stable step for y'' = -y (our example) divided by that of Hamming's method",
-            "more than 2, our choice, since an estimate within a factor of 2 is useful; at most 1, since *highly* is read "
-            "as more than Hamming's method",
-            (
-                at_least(
-                    "lack of an estimate",
-                    2.0,
-                    halved,
-                    why="halving the step estimates the error, at the cost of three times the evaluations",
-                ),
-                at_most(
-                    "susceptible to instabilities",
-                    1.0,
-                    classical / hamming,
-                    why=f"it is stable up to steps of {classical:.1f}, Hamming's method up to {hamming:.2f}",
-                ),
-            ),
+    yield statement(
+        "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
+        "errors; this makes them highly susceptible to numerical instabilities ...",
+        "2.4, L1334-1340",
+        "factor between the greatest error of u and its estimate, which is the change when the step is halved, divided "
+        "by 1 - 1/16. Second approach, classical method, 420 rpm, the greatest factor for steps of 4, 2, 1 and 0.5 ms. "
+        "Then the greatest stable step for y'' = -y (our example) divided by that of Hamming's method",
+        "more than 2, our choice, since an estimate within a factor of 2 is useful; at most 1, since *highly* is read "
+        "as more than Hamming's method",
+        at_least(
+            "lack of an estimate",
+            2.0,
+            halved,
+            why="halving the step estimates the error, at the cost of three times the evaluations",
         ),
-        Statement(
-            "... and, secondly, the large number of evaluation of the function [Phi]; four times for each step in a fourth "
-            "order method. The second of these drawbacks makes them unfavourable for use with our Lagrangian multiplier "
-            "formulation of the equations of the motion because of the large number of equations, and hence the lengthy "
-            "time involved in computation of the function [Phi].",
-            text("2.4, L1340-1356; with L1401-1405"),
-            "number of evaluations of Phi in a step of the classical method. Then its greatest error of u at 420 rpm, by each "
-            "approach of 3.1, divided by that of Hamming's method with half the step, which takes as many evaluations and so "
-            "as much time for them; this also judges *the most suitable*, as L1401-1405 calls the predictor-corrector methods",
-            "none for the number; more than 1, the sign alone, as *unfavourable* says",
-            (
-                replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
-                *(
-                    at_least(
-                        f"unfavourable; {label}",
-                        1.0,
-                        ratio,
-                        why="by the second approach with long steps Runge-Kutta's error is the smaller",
-                    )
-                    for label, ratio in dearer.items()
-                ),
-            ),
+        at_most(
+            "susceptible to instabilities",
+            1.0,
+            classical / hamming,
+            why=f"it is stable up to steps of {classical:.1f}, Hamming's method up to {hamming:.2f}",
         ),
-        Statement(
-            "For example, to obtain a solution equivalent to a fourth order Runge-kutta method we need to evaluate the "
-            "fourth derivative of the function [Phi].",
-            text("2.4, L1364-1370"),
-            "order of the error of a Taylor series for y' = Phi that uses the derivatives of Phi up to the third; Phi = -y "
-            "(our example), up to t = 1, steps of 0.1 and 0.05",
-            "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order without it "
-            "would be lower",
-            (
-                at_most(
-                    "", 3.5, order_of_series(3), why="the third derivative is enough, since Phi is itself a derivative"
-                ),
-            ),
+    )
+    yield statement(
+        "... and, secondly, the large number of evaluation of the function [Phi]; four times for each step in a fourth "
+        "order method. The second of these drawbacks makes them unfavourable for use with our Lagrangian multiplier "
+        "formulation of the equations of the motion because of the large number of equations, and hence the lengthy "
+        "time involved in computation of the function [Phi].",
+        "2.4, L1340-1356; with L1401-1405",
+        "number of evaluations of Phi in a step of the classical method. Then its greatest error of u at 420 rpm, by each "
+        "approach of 3.1, divided by that of Hamming's method with half the step, which takes as many evaluations and so "
+        "as much time for them; this also judges *the most suitable*, as L1401-1405 calls the predictor-corrector methods",
+        "none for the number; more than 1, the sign alone, as *unfavourable* says",
+        replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
+        *(
+            at_least(
+                f"unfavourable; {label}",
+                1.0,
+                ratio,
+                why="by the second approach with long steps Runge-Kutta's error is the smaller",
+            )
+            for label, ratio in dearer.items()
         ),
-    ]
+    )
+    yield statement(
+        "For example, to obtain a solution equivalent to a fourth order Runge-kutta method we need to evaluate the "
+        "fourth derivative of the function [Phi].",
+        "2.4, L1364-1370",
+        "order of the error of a Taylor series for y' = Phi that uses the derivatives of Phi up to the third; Phi = -y "
+        "(our example), up to t = 1, steps of 0.1 and 0.05",
+        "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order without it "
+        "would be lower",
+        at_most("", 3.5, order_of_series(3), why="the third derivative is enough, since Phi is itself a derivative"),
+    )
 
 
-def _hamming_statements() -> list[Statement]:
+def _hamming_statements() -> Iterator[Statement]:
     """Judge section 2.4 on the predictor-corrector methods."""
     classical, hamming = stable_steps(1j)
     order = np.log2(integrate_both(STEPS[-1]).errors[1] / integrate_both(0.5 * STEPS[-1]).errors[1])
@@ -424,70 +386,55 @@ def _hamming_statements() -> list[Statement]:
     truncation = float(np.abs(estimates).max() / np.abs(errors).max())
     roundoff = float(np.std(rounded - estimates) / np.std(roundings))
     inherent = float(np.abs(estimated_errors(START_ERROR)[0] - estimates).max()) / START_ERROR
-    return [
-        Statement(
-            "They [the predictor-corrector methods] provide an easy estimate of the errors, inherent, roundoff or "
-            "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
-            "methods are highly stable.",
-            text("2.4, L1379-1387"),
-            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in single steps of {1e3 * STEP:g} "
-            "ms from the exact motion at 420 rpm. For *truncation*: greatest estimate divided by the greatest error. For "
-            f"*roundoff*: change of the estimate when u is rounded to {CM_PER_METRE * UNIT:g} cm, divided by the rounding "
-            "(rms values). *Inherent* is read as an error of the start: greatest change of the estimate when u is wrong by "
-            f"{CM_PER_METRE * START_ERROR:g} cm there, divided by this error. For *convergent*: factor per step by which the "
-            "spurious solution of Milne's corrector grows, for y' = -y with the step 0.1 (our example). For *highly stable*: "
-            "greatest stable step of Hamming's method for y'' = -y (our example), divided by that of Runge-Kutta's",
-            "0.5 to 2, our choice, since an estimate within a factor of 2 is useful; at most 1, as *convergent* says: one "
-            "counterexample refutes *in all cases*; at least 1, since *highly* is read as no less than Runge-Kutta's method, "
-            "which L1338 calls *highly susceptible* to instabilities",
-            (
-                Case(label="estimate of the truncation", computed=truncation, lower=0.5, upper=2.0),
-                Case(
-                    label="estimate of the roundoff",
-                    computed=roundoff,
-                    lower=0.5,
-                    upper=2.0,
-                    why="the estimate shows a small part of it",
-                ),
-                Case(
-                    label="estimate of the inherent error",
-                    computed=inherent,
-                    lower=0.5,
-                    upper=2.0,
-                    why="the motion from the wrong start is a motion too",
-                ),
-                at_most(
-                    "convergent",
-                    1.0,
-                    spurious_root((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
-                    why="Milne's corrector, which the thesis uses, too (L1409-1415), is weakly unstable",
-                ),
-                at_least(
-                    "highly stable",
-                    1.0,
-                    hamming / classical,
-                    why=f"Hamming's method is stable up to steps of {hamming:.2f}, Runge-Kutta's up to {classical:.1f}",
-                ),
-            ),
+    yield statement(
+        "They [the predictor-corrector methods] provide an easy estimate of the errors, inherent, roundoff or truncation, from "
+        "the information already calculated. These errors are in all cases convergent and, thus the methods are highly stable.",
+        "2.4, L1379-1387",
+        f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in single steps of {1e3 * STEP:g} "
+        "ms from the exact motion at 420 rpm. For *truncation*: greatest estimate divided by the greatest error. For "
+        f"*roundoff*: change of the estimate when u is rounded to {CM_PER_METRE * UNIT:g} cm, divided by the rounding "
+        "(rms values). *Inherent* is read as an error of the start: greatest change of the estimate when u is wrong by "
+        f"{CM_PER_METRE * START_ERROR:g} cm there, divided by this error. For *convergent*: factor per step by which the "
+        "spurious solution of Milne's corrector grows, for y' = -y with the step 0.1 (our example). For *highly stable*: "
+        "greatest stable step of Hamming's method for y'' = -y (our example), divided by that of Runge-Kutta's",
+        "0.5 to 2, our choice, since an estimate within a factor of 2 is useful; at most 1, as *convergent* says: one "
+        "counterexample refutes *in all cases*; at least 1, since *highly* is read as no less than Runge-Kutta's method, "
+        "which L1338 calls *highly susceptible* to instabilities",
+        within("estimate of the truncation", 0.5, 2.0, truncation),
+        within("estimate of the roundoff", 0.5, 2.0, roundoff, why="the estimate shows a small part of it"),
+        within(
+            "estimate of the inherent error", 0.5, 2.0, inherent, why="the motion from the wrong start is a motion too"
         ),
-        Statement(
-            "One of their most attractive qualities is that they require only two evaluations of the function "
-            "[Phi] per step of integration.",
-            text("2.4, L1387-1391"),
-            "number of evaluations in one further step of (2.28) to (2.31)",
-            "none, since they are counted",
-            (replace(near("", 2.0, evaluations_a_step(), 0.0), stated="two"),),
+        at_most(
+            "convergent",
+            1.0,
+            spurious_root((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
+            why="Milne's corrector, which the thesis uses, too (L1409-1415), is weakly unstable",
         ),
-        Statement(
-            "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
-            text("2.4, L1407-1409"),
-            "order with which the error of u at 420 rpm falls, by (2.28) to (2.31) in the second approach, when the step "
-            f"changes from {1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
-            "at least the stated order",
-            (replace(at_least("", 4.0, order), stated="fourth"),),
-            "the final value (2.31) removes the leading error of the corrector, which adds one order",
+        at_least(
+            "highly stable",
+            1.0,
+            hamming / classical,
+            why=f"Hamming's method is stable up to steps of {hamming:.2f}, Runge-Kutta's up to {classical:.1f}",
         ),
-    ]
+    )
+    yield statement(
+        "One of their most attractive qualities is that they require only two evaluations of the function "
+        "[Phi] per step of integration.",
+        "2.4, L1387-1391",
+        "number of evaluations in one further step of (2.28) to (2.31)",
+        "none, since they are counted",
+        replace(near("", 2.0, evaluations_a_step(), 0.0), stated="two"),
+    )
+    yield statement(
+        "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
+        "2.4, L1407-1409",
+        "order with which the error of u at 420 rpm falls, by (2.28) to (2.31) in the second approach, when the step "
+        f"changes from {1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
+        "at least the stated order",
+        replace(at_least("", 4.0, order), stated="fourth"),
+        why="the final value (2.31) removes the leading error of the corrector, which adds one order",
+    )
 
 
 def draw(result: StudyResult) -> Figure:

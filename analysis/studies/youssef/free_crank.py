@@ -8,7 +8,6 @@ from functools import partial
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -20,7 +19,7 @@ from ...periodic import natural_frequency
 from ...run import Inputs, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, near, statement, unjudged, within
 from ..study import Study, StudyResult
 from ..variation import cache
 from .runs import ALIKE_WORDS, SIGN, SPEED, greatest, greatest_ratio, plain, table_3_1
@@ -66,15 +65,15 @@ class Turns:
         Relative range of the kinetic energy divided by the relative range of the squared crank speed.
     """
 
-    ends: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    speed_range: NDArray[np.float64]
-    slider: NDArray[np.float64]
-    slider_range: NDArray[np.float64]
-    velocity_range: NDArray[np.float64]
-    first: NDArray[np.float64]
-    second: NDArray[np.float64]
-    energy_share: NDArray[np.float64]
+    ends: FloatArray
+    speed: FloatArray
+    speed_range: FloatArray
+    slider: FloatArray
+    slider_range: FloatArray
+    velocity_range: FloatArray
+    first: FloatArray
+    second: FloatArray
+    energy_share: FloatArray
 
     @classmethod
     def from_run(cls, run: Trajectory, start: float = 0.0) -> Turns:
@@ -111,36 +110,33 @@ class Turns:
         """Return the mean crank speed (rad/s) at which the slider's second harmonic over the speed squared is greatest."""
         return self.speed_of_greatest(self.second / self.speed**2)
 
-    def speed_of_greatest(self, values: NDArray[np.float64]) -> float:
+    def speed_of_greatest(self, values: FloatArray) -> float:
         """Return the mean crank speed (rad/s) at which values, one for each turn, are greatest, interpolated between turns."""
         turns = np.arange(len(values), dtype=float)
         return float(np.interp(greatest(turns, values)[0], turns, self.speed))
 
 
-def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
+def turn_by_turn(run: Trajectory, output: str, start: float) -> FloatArray:
     """Sample an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
     return sample_turns(run["crank.angle"], run[output], start)
 
 
-def forward_samples(angle: NDArray[np.float64]) -> int:
+def forward_samples(angle: FloatArray) -> int:
     """Return the number of samples of the crank angle before the crank first stands still or turns back."""
     return 1 + int(np.argmax(np.append(np.diff(angle) <= 0.0, True)))
 
 
-def sample_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
-    """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES).
-
-    The values are interpolated by cubic splines; the turns end where the crank first stands still or turns back.
-    """
+def sample_turns(angle: FloatArray, values: FloatArray, start: float = 0.0) -> FloatArray:
+    """Sample values over each whole turn from ``start`` (rad) by cubic splines, until the crank stops; (turns, SAMPLES)."""
     n = forward_samples(angle)
     angle, values = angle[:n], values[:n]
     marks = np.arange(start, angle[-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
-    sampled: NDArray[np.float64] = CubicSpline(angle, values)(grid)
+    sampled: FloatArray = CubicSpline(angle, values)(grid)
     return sampled
 
 
-def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
+def half_natural_frequencies(stiffness: float) -> FloatArray:
     """Return half the slider's natural frequency (rad/s) with the effective mass at each crank angle of a turn, at u = 0."""
     parameters = table_3_1(stiffness)
     p = parameters.constants()
@@ -149,21 +145,15 @@ def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
     return 0.5 * np.sqrt(parameters.slider_stiffness / np.array(masses))
 
 
-def second_halves(runs: Sequence[Trajectory], start: float) -> list[NDArray[np.float64]]:
-    """Return the mean speeds of the later turns of each run, relative to the mean speed of its first turn.
-
-    The later turns are the second half of the turns that all runs have.
-    """
+def second_halves(runs: Sequence[Trajectory], start: float) -> list[FloatArray]:
+    """Return the mean speeds of the turns in the second half that all runs have, relative to that of each run's first turn."""
     speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]
 
 
 def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
-    """Judge whether a free crank loses mean speed only if it has a damper.
-
-    Each pair has a run without the damper and a run with it.
-    """
+    """Judge by pairs of runs, without the damper and with it, whether a free crank loses mean speed only with a damper."""
     cases = []
     for label, runs in pairs.items():
         free, damped = (half.max() for half in second_halves(runs, start))
@@ -173,10 +163,7 @@ def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: floa
 
 
 def undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> str:
-    """Return the range of the mean speed of a turn without the damper, in the runs of `damper_cases`, in words.
-
-    The words also say after how many whole turns a run without the damper ends early.
-    """
+    """Return in words the range of undamped mean speeds of a turn in `damper_cases`, and when a run ends early."""
     free = np.concatenate([second_halves(runs, start)[0] for runs in pairs.values()])
     early = {label: Turns.from_run(run, start).speed.size for label, (run, _) in pairs.items() if run.status}
     ends = "".join(
@@ -200,18 +187,16 @@ BOTH = {f"k = {plain(k)} dyn/cm": k for k in (SOFT, STIFF)}
 
 
 def _coast_result(
-    claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *statements: Statement
+    claim: str, run: Trajectory, columns: Mapping[str, FloatArray], *statements: Statement
 ) -> StudyResult:
     """Build the result of a free motion from its columns, up to the last turn that the figure shows."""
     turns = Turns.from_run(run)
     last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
     return StudyResult(
         claim=claim,
-        assignment=(
-            "The text does not say at which crank angle the torque is removed, nor how long the motion is followed. We "
-            "remove it at 0 from the steady motion, and follow the motion until the mean crank speed falls below "
-            f"{HARMONIC_SPEED:g} rad/s, which the text names."
-        ),
+        assignment="The text does not say at which crank angle the torque is removed, nor how long the motion is followed. We "
+        "remove it at 0 from the steady motion, and follow the motion until the mean crank speed falls below "
+        f"{HARMONIC_SPEED:g} rad/s, which the text names.",
         columns={name: values[: last + 1] for name, values in columns.items()},
         statements=statements,
     )
@@ -234,14 +219,14 @@ def free_speed(stiffness: float) -> StudyResult:
 def _free_swings() -> Statement:
     """Judge what Fig 3.11 and 3.12 show according to the thesis."""
     turns = {label: Turns.from_run(coast(k)) for label, k in BOTH.items()}
-    return Statement(
+    return statement(
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
-        text("3.3, L2241-2251"),
+        "3.3, L2241-2251",
         "least range of the crank speed in a turn, divided by its mean; range and mean relative to the turn before, each at "
         "its greatest; all turns in 10 s (our choice)",
         f"{ALIKE:g}, the rule for *steady*; {SIGN}",
-        tuple(
+        *(
             case
             for label, t in turns.items()
             for case in (
@@ -260,17 +245,18 @@ def _free_causes() -> Statement:
         at_most(f"change of the kinetic energy; {label}", 0.5, t.energy_share[: t.shown].max())
         for label, t in ((label, Turns.from_run(coast(k))) for label, k in BOTH.items())
     ]
-    return Statement(
+    return statement(
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
         "speed is due to viscous dissipation of energy in the slider.",
-        text("3.3, L2253-2259"),
+        "3.3, L2253-2259",
         "*the non-linearities* are read as the change of the inertia with the position. First the relative range of the "
         f"kinetic energy in a turn divided by that of the crank speed squared, the greatest down to {HARMONIC_SPEED:g} "
         f"rad/s: this is the part of the oscillation that they do not explain. Then the {UNDAMPED}, which are followed for 4 s "
         "and for 10 s (our choice)",
         f"at most half, as *due to* says; {LOSS}",
-        (*swings, *damper_cases(undamped, 0.0)),
-        undamped_range(undamped, 0.0),
+        *swings,
+        *damper_cases(undamped, 0.0),
+        why=undamped_range(undamped, 0.0),
     )
 
 
@@ -323,64 +309,57 @@ def soft_phase_plane() -> StudyResult:
     ]
     return _phase_plane(
         SOFT,
-        Statement(
+        statement(
             "Due to sampling of output data straight-line segments appear on the curves. These segments should in "
             "fact be smooth curves following the line pattern of the curves and appear as straight lines only because no "
             "points were sampled between the end points of each segment.",
-            text("3.3, L2266-2276"),
+            "3.3, L2266-2276",
             "order, in the time between samples, of the greatest distance of the curve from the middle of a straight "
             "segment, with u and u' relative to their ranges; samples 2 and 1 ms apart (our choice)",
             "order 2, as for a smooth curve (at a corner it is 1); 0.05, since an order is a whole number",
-            (
-                Case(
-                    label="straight segments",
-                    computed=None,
-                    why="the segments are in the drawing, which our copy lacks",
-                ),
-                *(near(f"smooth; {label}", 2.0, order_of_chords(coast(k)), 0.05) for label, k in BOTH.items()),
-            ),
+            unjudged("straight segments", "the segments are in the drawing, which our copy lacks"),
+            *(near(f"smooth; {label}", 2.0, order_of_chords(coast(k)), 0.05) for label, k in BOTH.items()),
         ),
-        Statement(
+        statement(
             "Both figures show the tendency of the phase plane plot towards the region u=[0, u'=0]. In so doing the "
             "amplitude of the oscillation decreases and a superimposed shift on the slider position, in the form of "
             "a drift towards u=[0], is noticeable.",
-            text("3.3, L2276-2287"),
+            "3.3, L2276-2287",
             "range of u and u' and distance of the mean of u from 0, relative to the turn before: the greatest values from "
             "the fourth turn on (our choice), since the release causes a transient. Then the drift of the mean of u over "
             "the turns drawn, relative to the greatest range of u in a turn",
             f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
-            (*tending, *drifts),
+            *tending,
+            *drifts,
         ),
-        Statement(
+        statement(
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
             "of oscillation further away from u=[0].",
-            text("3.3, L2287-2293"),
+            "3.3, L2287-2293",
             "drift of the mean of u over the turns drawn, and distance of this mean from 0 in the first turn, relative to "
             "those with k = 2e6 dyn/cm",
             SIGN,
-            (at_least("drift", 1.0, drift), at_least("distance", 1.0, distance)),
+            at_least("drift", 1.0, drift),
+            at_least("distance", 1.0, distance),
         ),
-        Statement(
+        statement(
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
-            text("3.3, L2293-2297"),
+            "3.3, L2293-2297",
             "higher harmonics of u (root of the sum of their squares) divided by the first harmonic, the least of the turns "
-            "drawn. Then this ratio divided by the ratio that the equation linear in u gives for the same motion of the "
-            "crank, the greatest: *non-linear* is read as non-linear in u, since the sentence is about the slider and the "
-            "thesis linearises in u (L1248-1250); the sentence at L2253 is about the crank, whose inertia changes with its "
-            "angle",
+            "drawn. Then this ratio divided by the ratio that the equation linear in u gives for the same motion of the crank, "
+            "the greatest: *non-linear* is read as non-linear in u, since the sentence is about the slider and the thesis "
+            "linearises in u (L1248-1250); the sentence at L2253 is about the crank, whose inertia changes with its angle",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
-            (
-                *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
-                *(at_least(f"non-linear; {label}", 1.0 + ALIKE, harmonics_over_linear(k)) for label, k in BOTH.items()),
-            ),
-            "the equation linear in u has these harmonics too, because the geometry of the linkage forces them",
+            *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
+            *(at_least(f"non-linear; {label}", 1.0 + ALIKE, harmonics_over_linear(k)) for label, k in BOTH.items()),
+            why="the equation linear in u has these harmonics too, because the geometry of the linkage forces them",
         ),
     )
 
 
 @cache
-def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def linear_motion(stiffness: float) -> tuple[FloatArray, FloatArray]:
     """Integrate the slider's equation, linearised about u = u' = 0, along the free crank's motion; return th2 (rad), u (m)."""
     run, p, turns = coast(stiffness), table_3_1(stiffness).constants(), Turns.from_run(coast(stiffness))
     # half a turn beyond those that are drawn
@@ -408,7 +387,7 @@ def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.flo
         ],
     )
 
-    def derivative(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         force, by_position, by_velocity = terms(t)
         return np.array([y[1], force + by_position * y[0] + by_velocity * y[1]])
 
@@ -417,14 +396,14 @@ def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.flo
     return crank[0], found.y[0]
 
 
-def higher_harmonics(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+def higher_harmonics(turns: FloatArray) -> FloatArray:
     """Return the root sum square of the second and all higher harmonics, relative to the first, for each row of samples."""
     sizes = np.abs(np.fft.rfft(turns, axis=1))
-    ratios: NDArray[np.float64] = np.linalg.norm(sizes[:, 2:], axis=1) / sizes[:, 1]
+    ratios: FloatArray = np.linalg.norm(sizes[:, 2:], axis=1) / sizes[:, 1]
     return ratios
 
 
-def drawn_harmonics(stiffness: float) -> NDArray[np.float64]:
+def drawn_harmonics(stiffness: float) -> FloatArray:
     """Return the `higher_harmonics` of u in each turn that the figure shows."""
     run = coast(stiffness)
     return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.from_run(run).shown]
@@ -455,64 +434,56 @@ def stiff_phase_plane() -> StudyResult:
     one_mass = half * float(share[(twice / response).argmax()])
     return _phase_plane(
         STIFF,
-        Statement(
-            "However, these non-linearities are more manifested in Fig. (3.14) around the crank angular speed of 27 "
-            "rad/sec.",
-            text("3.3, L2297-2301"),
+        statement(
+            "However, these non-linearities are more manifested in Fig. (3.14) around the crank angular speed of 27 rad/sec.",
+            "3.3, L2297-2301",
             "second harmonic of u divided by the first (our measure) at a mean crank speed of 27 rad/s, relative to that "
             "with k = 5e5 dyn/cm. Then the speeds at which this ratio, and the second harmonic divided by the speed "
             f"squared, are greatest; the motion is followed beyond the plot, down to {stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
-            (
-                at_least("ratio at 27 rad/s", 1.0, seen[0] / seen[1]),
-                near("speed of the greatest second harmonic over the speed squared", "27", resonance, about, "rad/s"),
-                near(
-                    "speed of the greatest ratio",
-                    "27",
-                    most,
-                    about,
-                    "rad/s",
-                    why=(
-                        f"the ratio goes on growing down to {most:.0f} rad/s. For a single mass with this damper, under "
-                        f"forces that grow with the square of the speed, it would be greatest at {one_mass:.0f} rad/s, not "
-                        "at half the natural frequency either"
-                    ),
-                ),
+            at_least("ratio at 27 rad/s", 1.0, seen[0] / seen[1]),
+            near("speed of the greatest second harmonic over the speed squared", "27", resonance, about, "rad/s"),
+            near(
+                "speed of the greatest ratio",
+                "27",
+                most,
+                about,
+                "rad/s",
+                why=f"the ratio goes on growing down to {most:.0f} rad/s. For a single mass with this damper, under "
+                f"forces that grow with the square of the speed, it would be greatest at {one_mass:.0f} rad/s, not "
+                "at half the natural frequency either",
             ),
-            "the speed of the greatest second harmonic over the speed squared is at the limit: with the torque removed at 90, "
-            f"180 and 270 deg, it is {elsewhere[0]:.2f}, {elsewhere[1]:.2f} and {elsewhere[2]:.2f} rad/s",
+            why="the speed of the greatest second harmonic over the speed squared is at the limit: with the torque removed at "
+            f"90, 180 and 270 deg, it is {elsewhere[0]:.2f}, {elsewhere[1]:.2f} and {elsewhere[2]:.2f} rad/s",
         ),
-        Statement(
+        statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
-            text("3.3, L2301-2305"),
+            "3.3, L2301-2305",
             "half the natural frequency, computed with the mean effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
             f"{ABOUT:g}, the rule for *approximately*",
-            (near("", "27", half, about, "rad/s"),),
+            near("", "27", half, about, "rad/s"),
         ),
-        Statement(
+        statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",
-            text("3.3, L2305-2307"),
+            "3.3, L2305-2307",
             "*subharmonic* is read as a resonance of the second harmonic at half the natural frequency. First the mean "
             "crank speed at which this harmonic divided by the speed squared is greatest, relative to the frequency of the "
             "row before; the force of the harmonic grows with the speed squared. Then the higher harmonics relative to "
             "those by the equation linear in u, as at Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
-            (
-                Case(label="resonance", computed=resonance / half, lower=1.0 - lowered, upper=1.0),
-                at_least("non-linearity", 1.0 + ALIKE, harmonics_over_linear(STIFF)),
-            ),
-            "the equation linear in u has this resonance too: the second harmonic of the force meets the natural frequency",
+            within("resonance", 1.0 - lowered, 1.0, resonance / half),
+            at_least("non-linearity", 1.0 + ALIKE, harmonics_over_linear(STIFF)),
+            why="the equation linear in u has this resonance too: the second harmonic of the force meets the natural frequency",
         ),
-        Statement(
-            "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined "
-            "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
-            "experienced by the slider.",
-            text("3.3, L2307-2317"),
+        statement(
+            "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined value but "
+            "extends over a range. This is due to the variable mass and inertia of the mechanism experienced by the slider.",
+            "3.3, L2307-2317",
             "natural frequency with the least effective mass of a turn, divided by that with the greatest, at u = 0; k = "
             "2e6 dyn/cm",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*",
-            (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
+            at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),
         ),
     )
 

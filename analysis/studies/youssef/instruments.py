@@ -5,13 +5,12 @@ from __future__ import annotations
 from math import atan2, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import READ
-from ..statements import Statement, at_most, near, text
+from ..statements import FloatArray, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns, result_curves
 from .rigs import LOST, rig, turn
 
@@ -23,24 +22,21 @@ HOLES, INERTIAS = 60, (5e-3, 2e-2)
 PULSED = 420.0
 
 
-def crank_speed(inertia: float) -> NDArray[np.float64]:
-    """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
-
-    The torque that the links need is taken from the steady motion at `PULSED` rpm.
-    """
+def crank_speed(inertia: float) -> FloatArray:
+    """Return the crank speed (rad/s) over a turn under a constant torque, with the links' torque steady at `PULSED` rpm."""
     torque = turn("A", PULSED)["drive.applied_torque"]
     angle = np.linspace(0.0, 2.0 * pi, len(torque) + 1)
     energy = CubicSpline(angle, torque.mean() - np.append(torque, torque[0])).antiderivative()(angle)
     return np.asarray(np.sqrt((PULSED * RAD_S_PER_RPM) ** 2 + 2.0 * (energy - energy.mean()) / inertia))
 
 
-def pulse_speeds(speed: NDArray[np.float64]) -> NDArray[np.float64]:
+def pulse_speeds(speed: FloatArray) -> FloatArray:
     """Return the mean speeds between successive holes (rad/s), from the times at which the holes pass the photocell."""
     time = CubicSpline(np.linspace(0.0, 2.0 * pi, len(speed)), 1.0 / speed).antiderivative()
     return np.asarray(2.0 * pi / HOLES / np.diff(time(np.linspace(0.0, 2.0 * pi, HOLES + 1))))
 
 
-def pulse_error(speed: NDArray[np.float64]) -> float:
+def pulse_error(speed: FloatArray) -> float:
     """Return the greatest relative error of the speeds by the pulses, compared with the speed midway between the holes."""
     between = np.interp(np.arange(HOLES) + 0.5, np.linspace(0.0, HOLES, len(speed)), speed)
     return float(np.abs(pulse_speeds(speed) / between - 1.0).max())
@@ -62,31 +58,29 @@ def compute_pulses() -> StudyResult:
         f"spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
                 "within the crank cycle. The crank speed may also be obtained from the width of the pulses and the speed of "
                 "paper in the U. V. recorder or the time base of the scope.",
-                text("8.2.1.2, L6255"),
+                "8.2.1.2, L6255",
                 "range of the crank speed over a turn, computed from the times from hole to hole (our reading of *width*), "
                 "relative to the true range. Then the greatest difference of this speed from the true one at the middle "
                 "between two holes, relative to the true one",
                 f"{READ:g}, the rule for what is read from a graph",
-                (
-                    *(
-                        near(
-                            f"{i:g} kg.m2, speed varies by {varies[i]:.1%}",
-                            1.0,
-                            np.ptp(pulses[i]) / np.ptp(speeds[i]),
-                            READ,
-                        )
-                        for i in INERTIAS
-                    ),
-                    *(at_most(f"{i:g} kg.m2, speed", READ, pulse_error(speeds[i])) for i in INERTIAS),
+                *(
+                    near(
+                        f"{i:g} kg.m2, speed varies by {varies[i]:.1%}",
+                        1.0,
+                        np.ptp(pulses[i]) / np.ptp(speeds[i]),
+                        READ,
+                    )
+                    for i in INERTIAS
                 ),
+                *(at_most(f"{i:g} kg.m2, speed", READ, pulse_error(speeds[i])) for i in INERTIAS),
             ),
-            Statement(
+            statement(
                 "A further [flywheel] (4) is mounted on the shaft to ensure constant speed input.",
-                text("8.2.1.1, L6140-6142"),
+                "8.2.1.1, L6140-6142",
                 why="no moment of inertia of crank and flywheels is printed",
             ),
         ),
@@ -120,11 +114,8 @@ DECAYING = {1: "A", 2: "C"}
 KICK, LENGTH, DRY = 1.0, 1.0, 0.5
 
 
-def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0.0) -> NDArray[np.float64]:
-    """Return the position (m) over time (s) of the disconnected slider after an impulse.
-
-    Dry friction (N) shifts the centre of each half swing.
-    """
+def impulse_response(spring: str, time: FloatArray, friction: float = 0.0) -> FloatArray:
+    """Return u (m) of the struck, disconnected slider at times (s); dry friction (N) shifts the centre of each half swing."""
     p = rig(spring)
     decay = 0.5 * p.slider_damping / p.slider_mass
     frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)
@@ -154,24 +145,22 @@ def compute_decay() -> StudyResult:
             u = CM_PER_METRE * impulse_response(spring, time, friction)
             columns[f"slider position u{name}; rig {number}; spring {spring} [cm]"] = u
     return StudyResult(
-        claim=(
-            "The disconnected slider is struck, and its oscillation decays; the logarithmic decrement gives the damping "
-            "coefficient."
-        ),
+        claim="The disconnected slider is struck, and its oscillation decays; the logarithmic decrement gives the damping "
+        "coefficient.",
         assignment="The text does not say which response is shown. We compute those of both rigs, with springs A and C; the "
         f"blow gives the slider {KICK:g} m/s, and the dry friction is {DRY:g} N, our choices.",
         columns=columns,
         statements=(
-            Statement(
+            statement(
                 "Average values of the coefficient were found to be [9 x 10^3 dyne.Sec/cm.] for Experimental Rig 1 and [5.5 "
                 "x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
-                text("8.3.3, L6401"),
+                "8.3.3, L6401",
                 why=LOST,
             ),
-            Statement(
+            statement(
                 "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil diameters "
                 "and the modulus of rigidity of the material gave good agreement with the experimentally determined values.",
-                text("8.3.2, L6383"),
+                "8.3.2, L6383",
                 why="no number of coils, diameter or modulus is printed",
             ),
         ),

@@ -11,7 +11,6 @@ from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from linkwork.errors import AssemblyError
@@ -21,7 +20,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE
 from ..rules import ABOUT, ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, near, statement, unjudged
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from .free_crank import LOSS, SAMPLES, UNDAMPED, Turns, coast, damper_cases, turn_by_turn, undamped_range
@@ -63,10 +62,7 @@ UNSAID = (
 def launch(
     torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000, damping: float = 3e4
 ) -> Trajectory:
-    """Simulate the mechanism of Table 3.1 from rest: the crank torque is T = T0 (1 - th2) up to th2 = 1 rad, then zero.
-
-    ``torque`` is T0. Torque, stiffness and damping are in CGS units; an event marks the end of the torque.
-    """
+    """Simulate a launch from rest with T0 = ``torque`` (CGS units): T = T0 (1 - th2) up to 1 rad, an event, then zero."""
     return simulate(
         table_3_1(stiffness, damping),
         Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
@@ -96,7 +92,7 @@ def least_torque() -> float:
     return float(np.sqrt(low * high))
 
 
-def last_crossing(values: NDArray[np.float64], level: float) -> float:
+def last_crossing(values: FloatArray, level: float) -> float:
     """Return the index, with a fraction, after which the values stay below a level; 0 if they always do."""
     above = np.flatnonzero(values > level)
     if not above.size:
@@ -166,10 +162,7 @@ def _launch_result(
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
-    """Draw a quantity of several launches over time, with a circle at th2 = 1 rad, where the torque ends.
-
-    ``values`` are the torques or springs of the launches, ``legend`` is the heading of the legend.
-    """
+    """Draw a quantity of launches with these torques or springs over time, with a circle at 1 rad, where the torque ends."""
     time, *columns = result.columns.values()
     name = list(result.columns)[1]
     curves, circles = [], []
@@ -196,11 +189,12 @@ RISE = (
 
 def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
     """Judge whether the crank speed rises linearly, and whether it peaks before the torque ends."""
-    bows = [
-        at_most(f"distance from a line; {label}", ALIKE, distance_from_line(*_rise_to_peak(run)))
-        for label, run in runs.items()
-    ]
-    angle = max(run_peak(run).angle for run in runs.values())
+    bows, peaks = [], {label: run_peak(run) for label, run in runs.items()}
+    for (label, run), peak in zip(runs.items(), peaks.values()):
+        before = run.time < peak.time
+        rise = np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
+        bows.append(at_most(f"distance from a line; {label}", ALIKE, distance_from_line(*rise)))
+    angle = max(peak.angle for peak in peaks.values())
     return (*bows, at_most("crank angle of the peak, greatest", 1.0, angle, "rad"))
 
 
@@ -216,13 +210,6 @@ def run_peak(run: Trajectory) -> Peak:
     """Return the greatest crank speed of a run, interpolated between the samples."""
     time, speed = greatest(run.time, run["crank.speed"])
     return Peak(time, float(np.interp(time, run.time, run["crank.angle"])), speed)
-
-
-def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time and crank speed up to the peak of the speed, each divided by its value at the peak."""
-    peak = run_peak(run)
-    before = run.time < peak.time
-    return np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
 
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
@@ -257,7 +244,7 @@ def _settled() -> tuple[Case, ...]:
         found = [[settling(torque, 1e6, rpm) for torque in TORQUES] for rpm in (RELEASED[1e6], *OTHER_RELEASES)]
     except AssemblyError:
         return tuple(
-            Case(label=label, computed=None, why="the steady motion of a free crank does not stay assembled")
+            unjudged(label, "the steady motion of a free crank does not stay assembled")
             for label in ("time, least", DECAY)
         )
     ratio = min(last.time / max(x.time for x in sooner) for *sooner, last in found)
@@ -273,31 +260,30 @@ def launch_speeds() -> StudyResult:
         "The speed rises linearly until the torque no longer accelerates the crank, then oscillates and decays.",
         runs,
         CRANK_SPEED,
-        Statement(
+        statement(
             "It is clear from the figure that during the time in which the torque T is acting the crank speed "
             "behaves in a linear manner up to the stage when the input torque becomes less than the torque "
             "sufficient to accelerate the mechanism. This stage occurs when the points [p1] and p2 are reached.",
-            text("3.2.2, L2124-2134"),
+            "3.2.2, L2124-2134",
             f"{RISE}; p1 and p2 are read as the peaks",
             ALIKE_WORDS,
-            _rise_cases(rises),
+            *_rise_cases(rises),
         ),
-        Statement(
+        statement(
             "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
             "equations of motion. However, it is oscillatory and decaying.",
-            text("3.2.2, L2142-2147"),
+            "3.2.2, L2142-2147",
             f"{SWINGS} after all three torques, up to 1 s; no torque acts there, by definition",
             f"{ALIKE:g}, the rule for *steady*; {SIGN}",
-            _swing_cases(runs, 1.0),
+            *_swing_cases(runs, 1.0),
         ),
-        Statement(
-            "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
-            "next section.",
-            text("3.2.2, L2147-2151"),
+        statement(
+            "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the next section.",
+            "3.2.2, L2147-2151",
             f"{UNDAMPED} {FROM_RELEASE}",
             LOSS,
-            damper_cases(undamped, 1.0),
-            undamped_range(undamped, 1.0),
+            *damper_cases(undamped, 1.0),
+            why=undamped_range(undamped, 1.0),
         ),
     )
 
@@ -312,35 +298,30 @@ def torque_over_time() -> StudyResult:
         assignment=UNSAID,
         columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": TORQUE_RANGE * time**2},
         statements=(
-            Statement(
+            statement(
                 "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
                 "shows a hyperbolic relationship[ ]between T0 and T [the time] asymptotic to [T0 = 0 and T = 0].",
-                text("3.2.2, L2134-2142"),
+                "3.2.2, L2134-2142",
                 "power of the time to which T0 is proportional, the mean of its values between the first two and the last two "
                 f"torques; least T0 that turns the crank by 1 rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm (our "
                 f"choice), relative to the time at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; {SMALL:g}, the rule for *small*, for the asymptotes",
-                (
-                    near(
-                        "exponent, -1 in a hyperbola with these asymptotes",
-                        -1.0,
-                        slope,
-                        ALIKE,
-                        why="T0 t^2 is nearly constant, not T0 t",
-                    ),
-                    at_most("least T0", SMALL, low / scale),
-                    at_most("least time", SMALL, release_time(1e12) / release_time(TORQUES[0])),
+                near(
+                    "exponent, -1 in a hyperbola with these asymptotes",
+                    -1.0,
+                    slope,
+                    ALIKE,
+                    why="T0 t^2 is nearly constant, not T0 t",
                 ),
+                at_most("least T0", SMALL, low / scale),
+                at_most("least time", SMALL, release_time(1e12) / release_time(TORQUES[0])),
             ),
         ),
     )
 
 
 def draw_torque_over_time(result: StudyResult) -> Figure:
-    """Draw the torque over the time to 1 rad, on linear and on logarithmic axes.
-
-    Lines with the exponents -1 and -2 pass through the point of T0 = 1e8 dyn.cm.
-    """
+    """Draw the torque over the time to 1 rad, linearly and logarithmically, with powers -1 and -2 through T0 = 1e8 dyn.cm."""
     torque, time = result.columns["T0 [dyn.cm]"], result.columns["time to 1 rad [s]"]
     hinge, three = float(np.interp(1e8, torque, time)), np.interp(TORQUES, torque, time)
     curves = [
@@ -368,43 +349,38 @@ def launch_positions() -> StudyResult:
         "The harder the launch, the further the slider moves from its start, and the later it settles into a decay.",
         runs,
         SLIDER,
-        Statement(
+        statement(
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
             "steady state decay.",
-            text("3.2.2, L2155-2159"),
+            "3.2.2, L2155-2159",
             f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay (as at Fig 3.10), relative "
             "to the longest such time with the other torques; from then on, mean of u relative to the turn before. The free "
             f"crank of Fig 3.10 is released at {OTHER_RELEASES[0]:g}, {OTHER_RELEASES[1]:g} and {RELEASED[1e6]:g} rpm (our "
             "choice), since its own transient affects the time",
             SIGN,
-            _settled(),
+            *_settled(),
         ),
-        Statement(
+        statement(
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
             "would be expected the shift from its initial position is greatest in the highest input torque case.",
-            text("3.2.2, L2159-2167"),
+            "3.2.2, L2159-2167",
             "greatest u, relative to the greatest size of u in the graph; least u of the three responses (the shaft is at "
             f"{shaft:g} cm). For *shift*: size of the mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 "
             "dyn.cm relative to the greater of the two others",
             f"{ALIKE_WORDS}; {SIGN}",
-            (
-                *(
-                    at_most(
-                        f"greatest u; {label}",
-                        ALIKE,
-                        top / largest,
-                        why="after the weakest launch the slider moves to both sides of its start",
-                    )
-                    for label, top in tops.items()
-                ),
-                at_least(
-                    "least u of all",
-                    shaft,
-                    CM_PER_METRE * min(run["slider.position"].min() for run in runs.values()),
-                    "cm",
-                ),
-                at_least("mean of u", 1.0, shift / max(lesser)),
+            *(
+                at_most(
+                    f"greatest u; {label}",
+                    ALIKE,
+                    top / largest,
+                    why="after the weakest launch the slider moves to both sides of its start",
+                )
+                for label, top in tops.items()
             ),
+            at_least(
+                "least u of all", shaft, CM_PER_METRE * min(run["slider.position"].min() for run in runs.values()), "cm"
+            ),
+            at_least("mean of u", 1.0, shift / max(lesser)),
         ),
     )
 
@@ -419,35 +395,33 @@ def launch_speeds_by_spring() -> StudyResult:
         "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
         _spring_runs(),
         CRANK_SPEED,
-        Statement(
+        statement(
             "The figure shows the crank speed increasing linearly up to the point when the torque input becomes "
             "smaller than the torque required to accelerate the mechanism.",
-            text("3.2.2, L2175-2181"),
+            "3.2.2, L2175-2181",
             RISE,
             ALIKE_WORDS,
-            _rise_cases(rises),
+            *_rise_cases(rises),
         ),
-        Statement(
+        statement(
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
-            text("3.2.2, L2181-2185"),
-            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} "
-            f"{FROM_RELEASE}",
+            "3.2.2, L2181-2185",
+            f"least range of the crank speed in a turn divided by its mean, up to 1 s; then the {UNDAMPED} {FROM_RELEASE}",
             LOSS,
-            (_swing_cases(_spring_runs(), 1.0)[0], *damper_cases(undamped, 1.0)),
-            undamped_range(undamped, 1.0),
+            _swing_cases(_spring_runs(), 1.0)[0],
+            *damper_cases(undamped, 1.0),
+            why=undamped_range(undamped, 1.0),
         ),
-        Statement(
+        statement(
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
             "similar loads and movement of slider.",
-            text("3.2.2, L2187-2191"),
+            "3.2.2, L2187-2191",
             "spread between the springs of the crank speed and, for the loads, of the force at pin C, at equal fractions of "
             "the time to 1 rad, each relative to its peak. The slider's movement is judged at Fig 3.10",
             f"{ALIKE_WORDS}; {ABOUT:g}, the rule for *similar*",
-            (
-                at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
-                at_most("force", ABOUT, np.ptp(loads, axis=0).max() / loads.max()),
-            ),
+            at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
+            at_most("force", ABOUT, np.ptp(loads, axis=0).max() / loads.max()),
         ),
     )
 
@@ -465,18 +439,18 @@ def launch_positions_by_spring() -> StudyResult:
         "spring and torque, and then a steady decay.",
         runs,
         SLIDER,
-        Statement(
+        statement(
             "... similar loads and movement of slider. The latter is verified in Fig. (3.10) in which the slider response is "
             "shown.",
-            text("3.2.2, L2191-2195"),
+            "3.2.2, L2191-2195",
             "spread of u between the springs, at equal fractions of the time to 1 rad, relative to its range in that time",
             f"{ABOUT:g}, the rule for *similar*",
-            (at_most("greatest", ABOUT, apart),),
+            at_most("greatest", ABOUT, apart),
         ),
-        Statement(
+        statement(
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
             "which occurs a free motion steady state decay which is studied in the next section.",
-            text("3.2.2, L2195-2201"),
+            "3.2.2, L2195-2201",
             "distance of u from its steady decay, relative to the range of this decay in the turn, in the first turn after the "
             "torque and in the last turn within 1 s, the latter to 1e-05, to which u of the decay is interpolated between its "
             "turns. The decay is u of a free crank that is released from its steady motion at "
@@ -485,26 +459,23 @@ def launch_positions_by_spring() -> StudyResult:
             "fastest turn of the released one. Then the mean of u relative to the turn before, once u is within "
             f"{ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
-            (
-                *(
-                    case
-                    for label, x in zip(runs, settled)
-                    for case in (
-                        at_least(f"{label}, first turn", ALIKE, x.first),
-                        at_most(f"{label}, last turn", ALIKE, round(x.last, 5)),
-                    )
-                ),
-                at_most(DECAY, 1.0, max(x.decay for x in settled)),
+            *(
+                case
+                for label, x in zip(runs, settled)
+                for case in (
+                    at_least(f"{label}, first turn", ALIKE, x.first),
+                    at_most(f"{label}, last turn", ALIKE, round(x.last, 5)),
+                )
             ),
+            at_most(DECAY, 1.0, max(x.decay for x in settled)),
         ),
-        Statement(
-            "The duration of the transient free motion stage depends on the stiffness k and the initial input torque "
-            "values.",
-            text("3.2.2, L2201-2205"),
+        statement(
+            "The duration of the transient free motion stage depends on the stiffness k and the initial input torque values.",
+            "3.2.2, L2201-2205",
             f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before; the "
             "longest time divided by the shortest",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*",
-            tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in times.items()),
+            *(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in times.items()),
         ),
     )
 

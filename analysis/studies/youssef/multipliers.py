@@ -5,6 +5,7 @@ The equations are exactly those of the thesis; their results are compared with t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import cos, sin
 
@@ -15,7 +16,7 @@ from linkwork.five_bar import dynamics, kinematics
 
 from ...run import Inputs, TorsionBar, simulate
 from ...units import RAD_S_PER_RPM
-from ..statements import Case, Statement, at_most, text
+from ..statements import Case, FloatArray, Statement, at_most, statement
 from .runs import SPEED, table_3_1
 
 #: The mechanism, its speed (rad/s), torque of a launch (N.m), and greatest relative rounding error.
@@ -29,7 +30,7 @@ FULL = replace(
 LOAD, FORCE = 3.0 - 2.0j, 4.0
 
 
-def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
+def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> FloatArray:
     """Solve A W = B, eqs (3.1), (3.8), (3.10), for W at q = (th2, th3, th4, u) and q' = ``qd`` (SI).
 
     W = (lambda3, lambda2, lambda1, u'', th4'', th3''). If a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
@@ -62,15 +63,12 @@ def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) 
         for row, entry in ((0, p.crank_inertia + m3 * p.crank_length**2), (1, couple.real), (4, y2), (5, x2)):
             a[row][0] = entry
         b[0] += torque
-    unknowns: NDArray[np.float64] = np.linalg.solve(a, b)
+    unknowns: FloatArray = np.linalg.solve(a, b)
     return unknowns
 
 
 def chapter_2_residuals() -> dict[str, float]:
-    """Return the greatest residual of each equation (2.11) to (2.21) in motions of the plant, relative to its greatest term.
-
-    The crank turns at constant speed, and then under a torque.
-    """
+    """Return each equation's greatest residual over its greatest term, (2.11) to (2.21), at constant speed and by torque."""
     p, worst, load = FULL.constants(), dict[str, float](), LOAD * np.exp(-1j * FULL.ground_inclination)
     for drive, th in ((drive, th) for drive in (1.0, 0.0) for th in np.linspace(0.0, 6.0, 25).tolist()):
         u, w, v = 0.01 * cos(2.0 * th), OMEGA, 0.3 * sin(th + 1.0)
@@ -134,9 +132,7 @@ def chapter_2_terms(
     }
 
 
-def closed_loop_state(
-    crank: float, u: float, speed: float, velocity: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def closed_loop_state(crank: float, u: float, speed: float, velocity: float) -> tuple[FloatArray, FloatArray]:
     """Return q and q' of the closed loop, eqs (2.1) and (2.4), at a crank angle, u and their rates (SI)."""
     p = TABLE.constants()
     g = kinematics.position(crank, u, p)
@@ -209,41 +205,38 @@ def judge_multipliers() -> tuple[Case, ...]:
     return tuple(at_most(label, ROUNDING, x) for label, x in worst.items())
 
 
-def chapter_2_statements() -> tuple[Statement, ...]:
+def chapter_2_statements() -> Iterator[Statement]:
     """Judge the equations of motion, and whether their multipliers are the pin forces."""
-    return (
-        Statement(
-            "Assuming that [F1x and F1y] are the values of the force F1 in the x and y directions the equations of "
-            "motion may be written as follows : [(2.11) to (2.14)] ... Two of these equations are : [(2.18), (2.19)]",
-            text("2.2, eqs (2.11) to (2.21), L796-934"),
-            "residual of each equation divided by its greatest term, with accelerations, force at C and crank torque by "
-            "our equations of motion, at 25 crank angles; (2.13) and (2.14) at constant speed and under a torque. Table "
-            "3.1, with angles, speeds and forces of ours, so that no term is zero. Signs, squares and dots that the scan lacks "
-            "are read as in (2.15) to (2.19), (3.8) and (4.10) to (4.13), and the illegible weight in (2.14) as that of rocker "
-            "and slider",
-            f"{ROUNDING:g}, above rounding errors",
-            tuple(at_most(name, ROUNDING, x) for name, x in chapter_2_residuals().items()),
-            "(2.20) has cos(theta4 + alpha) theta4'' where (2.15) has the sine",
-        ),
-        Statement(
-            "This means that four sets of values of [lambda_i] are obtainable. Each set corresponds to the pin force at the "
-            "joint[ ]where the [l]inkage is broken.",
-            text("2.3.1, L1058-1062"),
-            "multipliers of the loop if it is broken at a joint, minus the force in this joint by our equations of motion, "
-            "which have no multipliers, relative to the greatest value. The links before the joint are described from A, the "
-            "others from the slider. Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 rpm, at 25 crank angles with "
-            "slider positions and velocities of ours",
-            f"{ROUNDING:g}, above rounding errors",
-            judge_broken_loops(),
-        ),
-        Statement(
-            "[T]he multipliers are equal to the internal forces components and the input torque.",
-            text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
-            "multipliers by (3.1), (3.8) and (3.10), minus crank torque and force at C by our equations of motion, "
-            "which have no multipliers, relative to the greatest value of each. Table 3.1 with k = 1e6 dyn/cm and mu = "
-            "3e4 dyn.s/cm, 0.3 s from u = u' = 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
-            f"{ROUNDING:g}, above rounding errors",
-            judge_multipliers(),
-            "where our scan differs, we read (3.8) with the minus of l2 cos theta2 as in (4.10), and (3.10) with k for k2",
-        ),
+    yield statement(
+        "Assuming that [F1x and F1y] are the values of the force F1 in the x and y directions the equations of "
+        "motion may be written as follows : [(2.11) to (2.14)] ... Two of these equations are : [(2.18), (2.19)]",
+        "2.2, eqs (2.11) to (2.21), L796-934",
+        "residual of each equation divided by its greatest term, with accelerations, force at C and crank torque by our "
+        "equations of motion, at 25 crank angles; (2.13) and (2.14) at constant speed and under a torque. Table 3.1, with "
+        "angles, speeds and forces of ours, so that no term is zero. Signs, squares and dots that the scan lacks are read as "
+        "in (2.15) to (2.19), (3.8) and (4.10) to (4.13), and the illegible weight in (2.14) as that of rocker and slider",
+        f"{ROUNDING:g}, above rounding errors",
+        *(at_most(name, ROUNDING, x) for name, x in chapter_2_residuals().items()),
+        why="(2.20) has cos(theta4 + alpha) theta4'' where (2.15) has the sine",
+    )
+    yield statement(
+        "This means that four sets of values of [lambda_i] are obtainable. Each set corresponds to the pin force at the "
+        "joint[ ]where the [l]inkage is broken.",
+        "2.3.1, L1058-1062",
+        "multipliers of the loop if it is broken at a joint, minus the force in this joint by our equations of motion, "
+        "which have no multipliers, relative to the greatest value. The links before the joint are described from A, the "
+        "others from the slider. Table 3.1 with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm at 420 rpm, at 25 crank angles with "
+        "slider positions and velocities of ours",
+        f"{ROUNDING:g}, above rounding errors",
+        *judge_broken_loops(),
+    )
+    yield statement(
+        "[T]he multipliers are equal to the internal forces components and the input torque.",
+        "2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046",
+        "multipliers by (3.1), (3.8) and (3.10), minus crank torque and force at C by our equations of motion, "
+        "which have no multipliers, relative to the greatest value of each. Table 3.1 with k = 1e6 dyn/cm and mu = "
+        "3e4 dyn.s/cm, 0.3 s from u = u' = 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
+        f"{ROUNDING:g}, above rounding errors",
+        *judge_multipliers(),
+        why="where our scan differs, we read (3.8) with the minus of l2 cos theta2 as in (4.10), and (3.10) with k for k2",
     )

@@ -12,7 +12,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...run import Event, Inputs, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ALIKE, SLIGHTLY
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import FloatArray, at_least, at_most, near, statement, within
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from .runs import ALIKE_WORDS, PERIOD, SIGN, SPEED, TURNS, plain, scientific, table_3_1
@@ -46,18 +46,18 @@ class Drift:
     ``compared`` is the last turn that is compared with others and with a line.
     """
 
-    turns: NDArray[np.float64]
-    slider_cm: NDArray[np.float64]
+    turns: FloatArray
+    slider_cm: FloatArray
     collinear_turn: float
     compared: int = DRAWN_TURNS
 
-    def turn(self, number: int) -> NDArray[np.float64]:
+    def turn(self, number: int) -> FloatArray:
         """Return the slider position (cm) over the turn ``number``, counted from 1, both ends included."""
         n = SAMPLES_PER_DRIFT_TURN
         return self.slider_cm[(number - 1) * n : number * n + 1]
 
     @property
-    def until_collinear(self) -> NDArray[np.float64]:
+    def until_collinear(self) -> FloatArray:
         """Return the slider position (cm), NaN from the moment at which the links are collinear."""
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
@@ -67,11 +67,8 @@ class Drift:
         return int(np.fmin(self.compared, self.collinear_turn))
 
     @property
-    def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return the numbers of the turns after the transient, and the slider position (cm) at the end of each.
-
-        If no turn follows the transient, all turns are used, from number 0.
-        """
+    def _ends(self) -> tuple[NDArray[np.int64], FloatArray]:
+        """Return the numbers of the turns after the transient, or all if none follows, and u (cm) at the end of each."""
         last = self._last
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
         return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
@@ -94,10 +91,7 @@ class Drift:
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
-        """Return the greatest change of the motion from turn ``number`` to the next, relative to the range of the next turn.
-
-        The mean drift of each turn is subtracted first; the change is the range of the difference of the two turns.
-        """
+        """Return the greatest change from a turn to the next, without mean drifts, relative to the range of the next."""
         share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
         one, other = (u - share * (u[-1] - u[0]) for u in map(self.turn, (number, number + 1)))
         return float(np.ptp(other - one) / np.ptp(other))
@@ -109,20 +103,14 @@ class Drift:
 
     @property
     def transient(self) -> float:
-        """Return the number of turns before the first turn that is like the next one.
-
-        If the motion never becomes steady, return the turn at which the links become collinear, or else `DRAWN_TURNS`.
-        """
+        """Return the number of turns before one is like the next; if none is, those until collinear, or `DRAWN_TURNS`."""
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
         return next((n - 1 for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Simulate the mechanism of Table 3.1 at 420 rpm without a spring, up to `DRIFT_TURNS` turns or the limit of assembly.
-
-    The links count as collinear where the sine of the transmission angle falls below `COLLINEAR_SINE`.
-    """
+    """Simulate Table 3.1 at 420 rpm without a spring, for `DRIFT_TURNS` turns or to the limit of assembly."""
     angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -165,49 +153,48 @@ def drift_result() -> StudyResult:
         "weaker the damper, the sooner the links become collinear.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "The first of these is a transient region of duration approximately two cycles.",
-                text("3.2.1, L1905-1907"),
+                "3.2.1, L1905-1907",
                 f"number of cycles before the first steady one or, if there is none, until {collinear}. In a steady cycle "
                 f"the motion, minus the line from end to end of the cycle, changes to the next cycle by at most {ALIKE:g} of "
                 "its range, the rule for *steady*",
                 "half a cycle, the rule where whole cycles are counted",
-                tuple(near(_mu(mu), "2", run.transient, unit="cycles") for mu, run in runs.items()),
-                "with the two strongest dampers the first cycle is already like the second; with the others the motion "
+                *(near(_mu(mu), "2", run.transient, unit="cycles") for mu, run in runs.items()),
+                why="with the two strongest dampers the first cycle is already like the second; with the others the motion "
                 "never gets steady",
             ),
-            Statement(
+            statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",
-                text("3.2.1, L1907-1911"),
+                "3.2.1, L1907-1911",
                 "range of the difference between the motions of one cycle and the next, relative to the range of the next, "
                 "after the line from end to end of each cycle is subtracted: the greatest. Cycles 3 to "
                 f"{DRAWN_TURNS} (our choice), or until the links are collinear as in the row before",
                 f"{ALIKE_WORDS}; {FEWEST_TURNS} cycles, two for the transient and two to compare",
-                (none, *shapes),
+                none,
+                *shapes,
             ),
-            Statement(
+            statement(
                 "The drift is linear with crank angle and may be described by the equation u=M. [theta2]+[u0] (3.9) where [M] "
                 "and [u0] are constants depending on [mu].",
-                text("3.2.1, L1911-1917"),
+                "3.2.1, L1911-1917",
                 f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} (our choice), or until the "
                 "links are collinear, from their least-squares line, relative to the drift. Then the relative "
                 f"decrease in size of M and u0 from {_mu(5e5)} to 1e6",
                 f"{ALIKE_WORDS}; *depending* means by more than that; {FEWEST_TURNS} cycles, two for the transient and two "
                 "for a line",
-                (
-                    none,
-                    *bends,
-                    at_least("M depending on mu", ALIKE, 1.0 - other_rate / rate),
-                    at_least("u0 depending on mu", ALIKE, 1.0 - other_start / start),
-                ),
+                none,
+                *bends,
+                at_least("M depending on mu", ALIKE, 1.0 - other_rate / rate),
+                at_least("u0 depending on mu", ALIKE, 1.0 - other_start / start),
             ),
-            Statement(
+            statement(
                 "This indicates that for a small viscous force the linkage tends to collapse quickly into a collinear "
                 "configuration. However, as the viscous force is increased this tendency is counteracted.",
-                text("3.2.1, L1917-1925"),
+                "3.2.1, L1917-1925",
                 f"number of cycles until {collinear}, relative to the number with the next stronger damper",
                 f"{SIGN}; *quickly* is read as sooner than with the next stronger damper",
-                tuple(sooner),
+                *sooner,
             ),
         ),
     )
@@ -224,27 +211,22 @@ def weightless_result() -> StudyResult:
         claim="Without gravity the rate M of the drift is slightly reduced.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "It is clear from this figure that because the gravitational forces are eliminated the value of M in "
                 "equation (3.9) is slightly reduced.",
-                text("3.2.1, L1928-1932"),
+                "3.2.1, L1928-1932",
                 f"M from the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS} without gravity, relative to M with gravity, "
                 "for the two dampers with which the drift is nearly linear",
                 f"from {1 - SLIGHTLY:g} to {1 - ALIKE:g}, the rule for *slightly*",
-                tuple(
-                    Case(label=_mu(mu), computed=x, lower=1.0 - SLIGHTLY, upper=1.0 - ALIKE) for mu, x in ratios.items()
-                ),
-                "M is negative, and its size grows by a quarter. With its sign it is reduced, but not slightly",
+                *(within(_mu(mu), 1.0 - SLIGHTLY, 1.0 - ALIKE, x) for mu, x in ratios.items()),
+                why="M is negative, and its size grows by a quarter. With its sign it is reduced, but not slightly",
             ),
         ),
     )
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Draw the drift over the first turns and over many turns.
-
-    A cross marks where the links become collinear; dashed curves are without gravity.
-    """
+    """Draw the drift over few and many turns, a cross where the links become collinear, dashed without gravity."""
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):

@@ -16,9 +16,9 @@ from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import straightness, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
-from ..statements import Statement, at_most, text
+from ..statements import FloatArray, at_most, statement
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import FOUND, PRINTED, TARGET, FloatArray, best, curves_panel, linkages_panel, path_columns, shape_curve
+from .chapter_6 import FOUND, PRINTED, TARGET, best, curves_panel, linkages_panel, path_columns, shape_curve
 from .problems import PACKAGING_OFFSET_CM, PACKAGING_ROTATION, PROBLEMS, N
 
 #: Travel AB between the program's points (10, 0) and (164, 0) (cm).
@@ -35,10 +35,7 @@ class Part(NamedTuple):
 
 
 def straightest(curve: FloatArray) -> Part:
-    """Return the part of a closed curve of N points (m) with the least flatness error per length.
-
-    The parts compared lie within 120 degrees of crank rotation and are at least as long as the travel AB, along the line.
-    """
+    """Return the straightest part of a closed curve (m), within 120 deg of the crank and at least as long as the travel AB."""
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
     laid = np.vstack([curve, curve[:greatest]])
     parts = (
@@ -65,46 +62,39 @@ def compute() -> StudyResult:
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * points[:, k] for k, axis in enumerate("xy")}
     line, above = PACKAGING_OFFSET_CM[1], CM_PER_METRE * p.linkage.pivot_y
     return StudyResult(
-        claim=(
-            "A four-bar pushes packages along a straight line within 120 degrees of crank rotation and returns within a "
-            "region: nineteen desired points, 72 actual ones."
-        ),
-        assignment=(
-            "The figure with region and points is missing in our copy. The target in the plot is the polygon of the ten "
-            "points of the program (L9021)."
-        ),
+        claim="A four-bar pushes packages along a straight line within 120 degrees of crank rotation and returns within a "
+        "region: nineteen desired points, 72 actual ones.",
+        assignment="The figure with region and points is missing in our copy. The target in the plot is the polygon of the ten "
+        "points of the program (L9021).",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "A packaging machine in the form of a four bar is required to generate a path which is acceptable anywhere "
                 "within the region bound by the dashed lines shown in Fig. (6.11a).",
-                text("6.4.3, L5097"),
+                "6.4.3, L5097",
                 why="the figure with the bounds is missing in our copy",
             ),
-            Statement(
+            statement(
                 "The constraints are (1) the straight line travel AB should be achieved within the first 120° rotation of "
                 "the crank and (2) the crank shaft should be below the line of travel of the package.",
-                text("6.4.3, L5103"),
+                "6.4.3, L5103",
                 "extent in y divided by extent in x, for the straightest travel of the printed linkage that is at least as "
                 f"long as AB, {TRAVEL_CM:g} cm between the program's points, and lies within 120 deg of crank rotation, in "
                 "steps of 5 deg. Then the height of the crank shaft",
                 f"{ALIKE:g}, the rule for *straight*; [{line:g}] cm, the height of the program's line (L9022, its last digit "
                 "illegible)",
-                (
-                    at_most(
-                        f"extent in y over extent in x, {CM_PER_METRE * printed.travel:.0f} cm",
-                        ALIKE,
-                        printed.flatness / printed.travel,
-                    ),
-                    at_most("height of the crank shaft", line, above, "cm"),
+                at_most(
+                    f"extent in y over extent in x, {CM_PER_METRE * printed.travel:.0f} cm",
+                    ALIKE,
+                    printed.flatness / printed.travel,
                 ),
-                "theta20 is not printed, so that any 120 deg count as the first. Of the two closures we take the better, see "
-                "L4804",
+                at_most("height of the crank shaft", line, above, "cm"),
+                why="theta20 is not printed, so that any 120 deg count as the first. Of the two closures we take the better, "
+                "see L4804",
             ),
-            Statement(
-                "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "
-                "calculated.",
-                text("6.4.3, L5113"),
+            statement(
+                "Optimisation is then performed to find the optimum linkage from which 72 actual output points are calculated.",
+                "6.4.3, L5113",
                 why="the figure with the nineteen points is missing in our copy",
             ),
         ),

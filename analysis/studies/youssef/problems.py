@@ -18,10 +18,11 @@ from math import degrees, radians
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ... import synthesis as syn
 from ...units import CM_PER_METRE
+from ..statements import FloatArray
 
 CM2_PER_M2 = CM_PER_METRE**2
 DEG2_PER_RAD2 = degrees(1.0) ** 2
@@ -100,16 +101,13 @@ class PublishedProblem:
         return self.convert(syn.evaluate(self.task, linkage).error)
 
 
-def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
-    """Return n points of the target ellipse about (20, 15) cm, shape (n, 2) in m.
-
-    The semi-axis along x is given in cm, the semi-axis along y is 5 cm.
-    """
+def ellipse(semi_axis_cm: float, n: int) -> FloatArray:
+    """Return n points (m), shape (n, 2), of the ellipse about (20, 15) cm with this semi-axis along x and 5 cm along y."""
     phi = syn.turn(n)
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 
 
-def rocker_angle_deg(rotation: ArrayLike) -> NDArray[np.float64]:
+def rocker_angle_deg(rotation: ArrayLike) -> FloatArray:
     """Return the desired rocker angle th4* = 70 + 100 |sin(th/2)| (deg) at crank rotations th (rad)."""
     return np.asarray(70.0 + 100.0 * np.abs(np.sin(0.5 * np.asarray(rotation))))
 
@@ -257,7 +255,7 @@ AS_FOUND: Mapping[str, PublishedProblem] = MappingProxyType(
 )
 
 
-def pairing_area(desired: NDArray[np.float64], actual: NDArray[np.float64], *, window: float) -> float:
+def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> float:
     """Return the thesis's quality function of path generation, an area (section 6.4.1, listing at L9797).
 
     The first desired point is paired with the nearest actual point. Each following desired point is paired with the nearest of

@@ -10,6 +10,7 @@ that is best for the timed path; the thesis optimises th20 in this case too (L47
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from math import degrees, pi
@@ -23,9 +24,9 @@ from ...figures.curves import Label
 from ...synthesis import LINKS, USUAL, LargestLink, Linkage, UntimedPath, area_difference, evaluate, synthesize, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement, unjudged
 from ..study import Study, StudyResult, pad_columns
-from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best
+from .chapter_6 import SEARCH, TABLE, TRANSMISSION, best
 from .problems import AREA_N, AS_FOUND, CM2_PER_M2, PROBLEMS
 
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
@@ -94,10 +95,7 @@ def least_combined(start: Linkage) -> Linkage:
 
 
 def descent_ratio(name: str) -> float:
-    """Return the error of the printed linkage, relative to the error at the end of a descent from it.
-
-    A rocker function is taken as in `AS_FOUND`.
-    """
+    """Return the printed linkage's error over that at the end of a descent; rocker functions are taken as in `AS_FOUND`."""
     p, longest = AS_FOUND.get(name, PROBLEMS[name]), PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
     bounds = {**dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)), **p.bounds}
@@ -114,11 +112,7 @@ def descent_ratio(name: str) -> float:
 
 @cache
 def linkages() -> dict[str, Linkage]:
-    """Return the linkages compared, by name.
-
-    They are the printed linkages for the timed ellipse and for the path, and our linkages for the timed ellipse, for the path
-    and for the sum of both quality functions.
-    """
+    """Return by name the printed linkages for the timed ellipse and the path, and ours for each and for both together."""
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
     ours = {"ours; timed": timed, "ours; path": with_best_phase(best("path-a").linkage)}
@@ -139,37 +133,6 @@ def assembly_arguments(seed: int = 64) -> FloatArray:
     return np.asarray(4.0 * l4**2 * span - (l3**2 - l4**2 - span) ** 2)
 
 
-def count_least_inside() -> int:
-    """Count the random four-bars whose argument (6.12) is least at a crank angle other than 0 or 180 deg."""
-    found = assembly_arguments()
-    return int((found.min(axis=1) < found[:, [0, 36]].min(axis=1) - 1e-12).sum())
-
-
-def count_wrong_extremes() -> int:
-    """Count the random four-bars for which a test at 0 and 180 deg misjudges whether they close at all crank angles."""
-    closes = assembly_arguments() >= 0.0
-    return int((closes[:, [0, 36]].all(axis=1) != closes.all(axis=1)).sum())
-
-
-def count_late_violations() -> int:
-    """Count the random four-bars that close at the first crank angle, but not at every later one."""
-    found = assembly_arguments()
-    return int(((found[:, 0] >= 0.0) & (found < 0.0).any(axis=1)).sum())
-
-
-def share_of_values() -> float:
-    """Return the number of values of (6.12) in a test at 0 and 180 deg only, divided by the number in a test at all angles.
-
-    The random four-bars are tested; the test of each stops at the first negative value.
-    """
-    violated = assembly_arguments() < 0.0
-    at_two, at_all = (
-        np.where(bad.any(axis=1), bad.argmax(axis=1) + 1, bad.shape[1]).sum()
-        for bad in (violated[:, [0, 36]], violated)
-    )
-    return float(at_two / at_all)
-
-
 def compute() -> StudyResult:
     """Compute both quality functions of the linkages, and judge the statements."""
     q = {name: qualities(linkage) for name, linkage in linkages().items()}
@@ -180,85 +143,94 @@ def compute() -> StudyResult:
         claim="The quality functions of function and path generation may be combined into one. The example is ellipse (a).",
         assignment="The thesis gives no example. Problem, equal weights and the limit of the links are our choice.",
         columns=pad_columns(columns),
-        statements=judge_qualities(q["ours; timed"], q["ours; path"], q["ours; combined"]),
+        statements=tuple(judge_qualities(q["ours; timed"], q["ours; path"], q["ours; combined"])),
     )
 
 
-def judge_qualities(timed: Quality, path: Quality, found: Quality) -> tuple[Statement, ...]:
+def judge_qualities(timed: Quality, path: Quality, found: Quality) -> Iterator[Statement]:
     """Judge the statements on the quality functions, by our best linkages for the time, for the path, and for both."""
     ratios = {f"Fig {n}": descent_ratio(row.problem) for n, row in TABLE.items()}
-    return (
-        Statement(
-            "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. "
-            "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
-            "specified times.",
-            text("6.2.2, L4205"),
-            "area between curve and ellipse (a) of the linkage with the least error (6.6), relative to the least area. "
-            f"Both are the least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link "
-            f"above {CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
-            f"above {1.0 + ALIKE:g}, the rule for *the same*, since a condition that costs nothing would leave the area "
-            "unchanged",
-            (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
-            "that minimisation yields a minimum is not judged, since it claims nothing",
-        ),
-        Statement(
-            "An approximation to the desired output may, therefore, be obtained by taking both function and path "
-            "generation into consideration.",
-            text("6.2.2, L4243"),
-            "error in time (6.6) and area of the linkage that the downhill simplex finds for their sum, within the same limits",
-            "at most the errors that the thesis states for linkages found for one of the two, and calls favourable (L4864) "
-            "and tolerable (L5043)",
-            (
-                at_most("error in time, as at Fig 6.4", str(TIMED.error), found.timed, "cm2"),
-                at_most("area, as at Fig 6.9", str(PATH.error), found.area, "cm2"),
-            ),
-        ),
-        Statement(
-            "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
-            text("6.3.2, L4514"),
-            f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at one "
-            "of 72 crank angles than at both angles with Coswt = +-1",
-            "none, since counts are exact",
-            (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
-            "this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
-        ),
-        Statement(
-            "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
-            "in solving the system equations if the constraints are violated at later stages in the crank cycle. However, "
-            "(b) [the constraint (6.14)] is a straightforward evaluation of a constant relation and it is clearly "
-            "preferable.",
-            text("6.3.2, L4541-4549"),
-            "of the same four-bars, the number that close at the first of the 72 crank angles but not at all of them, and the "
-            "number for which (6.14) and these angles disagree. Then the number of values of C that (b) needs for all these "
-            "four-bars, divided by the number that (a) needs; each stops at the first negative value",
-            "one is enough for *may be*; none for a disagreement; at most 1, since (b) is called preferable",
-            (
-                at_least("violated at later stages", 1.0, count_late_violations()),
-                near("(6.14) disagrees", 0.0, count_wrong_extremes(), 0.0),
-                at_most("values of C", 1.0, share_of_values()),
-            ),
-        ),
-        Statement(
-            "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
-            "planar linkage yielding in all cases a minimum.",
-            text("6.5, L5136"),
-            "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent "
-            f"has at most {STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within "
-            "the printed bounds",
-            f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
-            (
-                *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
-                Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
-                Case(label="other types of linkage", computed=None, why="none is given"),
-            ),
-            "how well they generate the outputs is judged at Figs 6.4 to 6.9",
-        ),
-        Statement(
-            "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
-            "satisfactory result.",
-            text("6.5, L5140"),
-            why="no example is given; the strategy of 7.4 is judged at L6026",
-        ),
+    yield statement(
+        "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. It "
+        "does, however, impose the unnecessary condition that the mechanism pass the desired points at the specified times.",
+        "6.2.2, L4205",
+        "area between curve and ellipse (a) of the linkage with the least error (6.6), relative to the least area. "
+        f"Both are the least that we find with a transmission angle of at least {TRANSMISSION:g} deg and no link "
+        f"above {CM_PER_METRE * LONGEST:.2f} cm, the longest printed for this ellipse",
+        f"above {1.0 + ALIKE:g}, the rule for *the same*, since a condition that costs nothing would leave the area unchanged",
+        at_least("area", 1.0 + ALIKE, timed.area / path.area),
+        why="that minimisation yields a minimum is not judged, since it claims nothing",
+    )
+    yield statement(
+        "An approximation to the desired output may, therefore, be obtained by taking both function and path "
+        "generation into consideration.",
+        "6.2.2, L4243",
+        "error in time (6.6) and area of the linkage that the downhill simplex finds for their sum, within the same limits",
+        "at most the errors that the thesis states for linkages found for one of the two, and calls favourable (L4864) "
+        "and tolerable (L5043)",
+        at_most("error in time, as at Fig 6.4", str(TIMED.error), found.timed, "cm2"),
+        at_most("area, as at Fig 6.9", str(PATH.error), found.area, "cm2"),
+    )
+    yield from _judge_constraint()
+    yield statement(
+        "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
+        "planar linkage yielding in all cases a minimum.",
+        "6.5, L5136",
+        "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent has at most "
+        f"{STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within the printed bounds",
+        f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
+        *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
+        unjudged("Fig 6.11", "its nineteen points are lost"),
+        unjudged("other types of linkage", "none is given"),
+        why="how well they generate the outputs is judged at Figs 6.4 to 6.9",
+    )
+    yield statement(
+        "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
+        "satisfactory result.",
+        "6.5, L5140",
+        why="no example is given; the strategy of 7.4 is judged at L6026",
+    )
+
+
+def share_of_values(found: FloatArray) -> float:
+    """Return how many values (6.12) needs at 0 and 180 deg only, over those at all angles, each test until one is negative."""
+    at_two, at_all = (
+        np.where(bad.any(axis=1), bad.argmax(axis=1) + 1, bad.shape[1]).sum()
+        for bad in (found[:, [0, 36]] < 0.0, found < 0.0)
+    )
+    return float(at_two / at_all)
+
+
+def _judge_constraint() -> Iterator[Statement]:
+    """Judge the statements on the constraint of assembly, (6.12) to (6.14), by random four-bars."""
+    found = assembly_arguments()
+    violated = found < 0.0
+    # by (6.14) at 0 and 180 deg only
+    extremes = found[:, [0, 36]]
+    least_inside = np.sum(found.min(axis=1) < extremes.min(axis=1) - 1e-12)
+    late = np.sum(~violated[:, 0] & violated.any(axis=1))
+    wrong = np.sum((extremes < 0.0).any(axis=1) != violated.any(axis=1))
+    yield statement(
+        "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
+        "6.3.2, L4514",
+        f"number of {SAMPLES} random four-bars, with lengths from 0.1 to 1, for which C of (6.12) is less at one "
+        "of 72 crank angles than at both angles with Coswt = +-1",
+        "none, since counts are exact",
+        near("least elsewhere", 0.0, least_inside, 0.0),
+        why="this is so for all lengths, since C contains -4 l1^2 l2^2 times the square of Coswt",
+    )
+    yield statement(
+        "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted in solving the "
+        "system equations if the constraints are violated at later stages in the crank cycle. However, (b) [the constraint "
+        "(6.14)] is a straightforward evaluation of a constant relation and it is clearly preferable.",
+        "6.3.2, L4541-4549",
+        "of the same four-bars, the number that close at the first of the 72 crank angles but not at all of them, and the "
+        "number for which (6.14) and these angles disagree. Then the number of values of C that (b) needs for all these "
+        "four-bars, divided by the number that (a) needs; each stops at the first negative value",
+        "one is enough for *may be*; none for a disagreement; at most 1, since (b) is called preferable",
+        at_least("violated at later stages", 1.0, late),
+        near("(6.14) disagrees", 0.0, wrong, 0.0),
+        at_most("values of C", 1.0, share_of_values(found)),
     )
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import SpecialPoint, Sweep, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SLIGHTLY
-from ..statements import Case, Statement, at_least, at_most, text
+from ..statements import FloatArray, Statement, at_least, at_most, statement, unjudged
 from ..study import Study, StudyResult, pad_columns, result_curves
 from ..variation import cache
 from .rigs import (
@@ -77,24 +78,24 @@ def compute_rig_1() -> StudyResult:
         "speeds, and from 917 to 1036 rpm two stable motions exist at the same speed.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
                 "resonance curves could not be obtained using this apparatus.",
-                text("8.4.1.2, L6543"),
+                "8.4.1.2, L6543",
                 "amplitude at the natural frequency, 580 and 1160 rpm (L6553), relative to the greatest amplitude that the "
                 "guide did accommodate, at the lower speeds of the row at L6555",
                 "at least 1: we read *large* as more than the guide did accommodate, since its length is not printed",
-                tuple(at_least(f"spring {s}", 1.0, amplitude(turn(s, NATURAL[s])) / accommodated[s][1]) for s in "AB"),
+                *(at_least(f"spring {s}", 1.0, amplitude(turn(s, NATURAL[s])) / accommodated[s][1]) for s in "AB"),
             ),
-            Statement(
+            statement(
                 "However when the speed was increased to 500 RPM with spring A and 800 RPM with spring B the amplitude of "
                 "slider oscillations was so large that the slider guide could not accommodate it.",
-                text("8.4.1.2, L6555"),
+                "8.4.1.2, L6555",
                 "amplitude at this speed, relative to the greatest at lower speeds, which the guide did accommodate: every "
                 "5 rpm from 240 rpm (spring A) and 500 rpm (spring B), the lowest speeds of the figures",
                 "at least 1, since the guide can accommodate at least what it did accommodate",
-                tuple(at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, stopped[s] / accommodated[s][1]) for s in "AB"),
-                f"with spring B it is {stopped['B']:.2f} cm, but {most:.2f} cm at {at:.0f} rpm, which the rig passed: "
+                *(at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, stopped[s] / accommodated[s][1]) for s in "AB"),
+                why=f"with spring B it is {stopped['B']:.2f} cm, but {most:.2f} cm at {at:.0f} rpm, which the rig passed: "
                 "it ran at 540 and at 580 rpm (L6748)",
             ),
         ),
@@ -102,10 +103,7 @@ def compute_rig_1() -> StudyResult:
 
 
 def accommodated_amplitude(spring: str) -> tuple[float, float]:
-    """Return the speed (rpm) and the size (cm) of the greatest amplitude below the speed at which the guide was too short.
-
-    The speeds begin with the lowest of the figures, in steps of 5 rpm.
-    """
+    """Return speed (rpm) and size (cm) of the greatest amplitude, every 5 rpm, below that at which the guide was too short."""
     speeds = np.arange(FIRST[spring], float(STOPPED[spring]), 5.0).tolist()
     size, at = max((amplitude(turn(spring, w)), w) for w in speeds)
     return at, size
@@ -151,7 +149,7 @@ COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
 SHOWN = {"A": 420.0, "B": 660.0}
 
 
-def amplitude_decrease(coefficient: float) -> NDArray[np.float64]:
+def amplitude_decrease(coefficient: float) -> FloatArray:
     """Return the decrease of the amplitude (cm) by friction in the guide, with spring A at the speeds `COMPARED`."""
     return np.array(
         [
@@ -162,12 +160,7 @@ def amplitude_decrease(coefficient: float) -> NDArray[np.float64]:
 
 
 def spread_beyond_constant(coefficient: float) -> float:
-    """Return the variation of the amplitude's decrease with the speed, relative to constant friction.
-
-    The variation is the greatest decrease divided by the least, with spring A at the speeds `COMPARED`; the result is the
-    variation with friction by a coefficient, divided by the variation with constant friction. The constant friction
-    is the coefficient times the mean of the guide's force over these turns without friction.
-    """
+    """Return the ratio of the greatest to the least decrease by friction, over that by constant friction of the same mean."""
     constant = coefficient * float(np.mean([np.abs(turn("A", w)["slider.guide_force"]).mean() for w in COMPARED["A"]]))
     even = [amplitude(turn("A", w)) - amplitude(turn("A", w, slider_coulomb_friction=constant)) for w in COMPARED["A"]]
     varying = amplitude_decrease(coefficient)
@@ -194,7 +187,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
     return (shift + 180.0) % 360.0 - 180.0
 
 
-def friction_force_ratios(speed: float, coefficient: float) -> NDArray[np.float64]:
+def friction_force_ratios(speed: float, coefficient: float) -> FloatArray:
     """Return the ratio of the guide's friction to the damper's force, both as means and as maxima of a turn, with spring A."""
     steady = turn("A", speed, slider_friction_coefficient=coefficient)
     forces = (
@@ -206,10 +199,7 @@ def friction_force_ratios(speed: float, coefficient: float) -> NDArray[np.float6
 
 
 def difference_from_constant(speed: float, coefficient: float) -> float:
-    """Return the greatest difference of u with friction by a coefficient from u with constant friction, with spring A.
-
-    The constant friction is the mean over a turn without friction. The result is relative to the amplitude without friction.
-    """
+    """Return u's greatest difference from u with constant friction of the same mean, over the smooth amplitude; spring A."""
     mean = coefficient * float(np.abs(turn("A", speed)["slider.guide_force"]).mean())
     varying, even = (
         slider(turn("A", speed, **{name: value}))
@@ -220,7 +210,7 @@ def difference_from_constant(speed: float, coefficient: float) -> float:
 
 def compute_friction() -> StudyResult:
     """Compute the amplitude over the speed with friction, and judge the statements on the amplitudes."""
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, FloatArray] = {}
     for s in "AB":
         columns[f"speed; spring {s} [rpm]"] = GRID[s]
         for c in COEFFICIENTS:
@@ -230,18 +220,16 @@ def compute_friction() -> StudyResult:
     ends = slight_coefficients()
     return StudyResult(
         claim="Friction in proportion to the guide's force lowers the amplitude slightly and hardly shifts the motion.",
-        assignment=(
-            "The text gives no coefficient and no measured amplitude. With spring A at 390, 420 and 450 rpm, coefficients "
-            f"of {ends[0]:.3f} to {ends[1]:.3f} reduce the amplitude by {100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} %, a "
-            "slight variation, at the speed at which they reduce it most. Each case takes that end of this range and that "
-            "speed which are least favourable to the sentence."
-        ),
+        assignment="The text gives no coefficient and no measured amplitude. With spring A at 390, 420 and 450 rpm, "
+        f"coefficients of {ends[0]:.3f} to {ends[1]:.3f} reduce the amplitude by {100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} %, "
+        "a slight variation, at the speed at which they reduce it most. Each case takes that end of this range and that speed "
+        "which are least favourable to the sentence.",
         columns=pad_columns(columns),
-        statements=_friction(ends),
+        statements=tuple(_friction(ends)),
     )
 
 
-def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
+def _friction(ends: tuple[float, float]) -> Iterator[Statement]:
     """Judge the statements on the amplitudes, given the least and the greatest coefficient whose effect is slight."""
     each = [(w, c) for w in COMPARED["A"] for c in ends]
     force = {w: turn("A", w)["slider.guide_force"] for w in COMPARED["A"]}
@@ -249,76 +237,63 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
     apart = max(np.abs(f - turn("A", w)["pin.D.fy"]).max() / greatest[w] for w, f in force.items())
     # by coefficient, then by measure
     rubbed = np.array([np.max([friction_force_ratios(w, c) for w in COMPARED["A"]], axis=0) for c in ends])
-    return (
-        Statement(
-            "[That the phase is almost in total agreement while the amplitude shows slight variations] may be explained by "
-            "the fact that the frictional forces opposing the slider motion are considered solely viscous in the theory.",
-            text("8.4.1.1, L6486"),
-            "delay in crank angle, to 0.25 deg, at which the motion with friction in the guide agrees best with the motion "
-            "without it",
-            f"{ABOUT_DEG:g} deg, the rule for *almost*",
-            (at_most("shift", ABOUT_DEG, max(abs(lag("A", w, c)) for w, c in each), "deg"),),
-            "the amplitude varies slightly by our choice of the coefficients",
+    yield statement(
+        "[That the phase is almost in total agreement while the amplitude shows slight variations] may be explained by "
+        "the fact that the frictional forces opposing the slider motion are considered solely viscous in the theory.",
+        "8.4.1.1, L6486",
+        "delay in crank angle, to 0.25 deg, at which the motion with friction in the guide agrees best with the motion "
+        "without it",
+        f"{ABOUT_DEG:g} deg, the rule for *almost*",
+        at_most("shift", ABOUT_DEG, max(abs(lag("A", w, c)) for w, c in each), "deg"),
+        why="the amplitude varies slightly by our choice of the coefficients",
+    )
+    yield statement(
+        "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
+        "although in this experiment the viscous forces are dominant.",
+        "8.4.1.1, L6490",
+        "Coulomb friction in the guide divided by the damper's force, for the mean and for the greatest force in a turn",
+        "at most 1, since the *dominant* force is the greater",
+        at_most("mean force", 1.0, rubbed[:, 0].max()),
+        unjudged(
+            "greatest force",
+            f"the ratio of the greatest forces is {rubbed[0, 1]:.2f} to {rubbed[1, 1]:.2f} within the range of coefficients",
         ),
-        Statement(
-            "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
-            "although in this experiment the viscous forces are dominant.",
-            text("8.4.1.1, L6490"),
-            "Coulomb friction in the guide divided by the damper's force, for the mean and for the greatest force in a turn",
-            "at most 1, since the *dominant* force is the greater",
-            (
-                at_most("mean force", 1.0, rubbed[:, 0].max()),
-                Case(
-                    label="greatest force",
-                    computed=None,
-                    why=f"the ratio of the greatest forces is {rubbed[0, 1]:.2f} to {rubbed[1, 1]:.2f} within the range of "
-                    "coefficients",
-                ),
-            ),
-            "that Coulomb friction exists is taken as given",
+        why="that Coulomb friction exists is taken as given",
+    )
+    yield statement(
+        "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "
+        "force, which is the vertical force in the rocker-slider joint, varies with crank speed and also within a "
+        "crank cycle, this explains the difference in amplitude between the theoretical and experimental motions "
+        "with variation of crank speed and also within one crank cycle.",
+        "8.4.1.1, L6496",
+        "for the guide's force: the greatest relative to the mean in a turn; the greatest at 450 rpm relative to that "
+        "at 390 rpm; its greatest difference from the vertical force in the joint, relative to the greatest. For "
+        "friction: the decrease of the amplitude in cm, the greatest of the three speeds relative to the least, divided "
+        "by the same ratio with one constant friction (the mean of the three); then the greatest difference of u from u "
+        "with constant friction of the same mean, relative to the amplitude",
+        f"the rule for *the same*: ratios that are seen exceed {1.0 + ALIKE:g}, differences that are seen exceed "
+        f"{ALIKE:g}, and the force differs from the joint's by at most {ALIKE:g}",
+        at_least("force, within a cycle", 1.0 + ALIKE, min(f / np.abs(force[w]).mean() for w, f in greatest.items())),
+        at_least("force, with the speed", 1.0 + ALIKE, greatest[450.0] / greatest[390.0]),
+        at_most("force, from the joint's", ALIKE, apart, why="the slider's weight is added to the joint's force"),
+        at_least(
+            "decrease, with the speed",
+            1.0 + ALIKE,
+            min(map(spread_beyond_constant, ends)),
+            why="with a constant friction the decrease varies as much",
         ),
-        Statement(
-            "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "
-            "force, which is the vertical force in the rocker-slider joint, varies with crank speed and also within a "
-            "crank cycle, this explains the difference in amplitude between the theoretical and experimental motions "
-            "with variation of crank speed and also within one crank cycle.",
-            text("8.4.1.1, L6496"),
-            "for the guide's force: the greatest relative to the mean in a turn; the greatest at 450 rpm relative to that "
-            "at 390 rpm; its greatest difference from the vertical force in the joint, relative to the greatest. For "
-            "friction: the decrease of the amplitude in cm, the greatest of the three speeds relative to the least, divided "
-            "by the same ratio with one constant friction (the mean of the three); then the greatest difference of u from u "
-            "with constant friction of the same mean, relative to the amplitude",
-            f"the rule for *the same*: ratios that are seen exceed {1.0 + ALIKE:g}, differences that are seen exceed "
-            f"{ALIKE:g}, and the force differs from the joint's by at most {ALIKE:g}",
-            (
-                at_least(
-                    "force, within a cycle", 1.0 + ALIKE, min(f / np.abs(force[w]).mean() for w, f in greatest.items())
-                ),
-                at_least("force, with the speed", 1.0 + ALIKE, greatest[450.0] / greatest[390.0]),
-                at_most(
-                    "force, from the joint's", ALIKE, apart, why="the slider's weight is added to the joint's force"
-                ),
-                at_least(
-                    "decrease, with the speed",
-                    1.0 + ALIKE,
-                    min(map(spread_beyond_constant, ends)),
-                    why="with a constant friction the decrease varies as much",
-                ),
-                at_least("difference, within a cycle", ALIKE, min(difference_from_constant(w, c) for w, c in each)),
-            ),
-        ),
-        Statement(
-            "Other factors contributing to the difference are (a) only an average estimation of the damping coefficient "
-            "is considered in the theory and (b) the friction in the pin joints of the linkage is also ignored in the "
-            "theory.",
-            text("8.4.1.1, L6508"),
-            why="neither the scatter of the coefficient, nor a size of the bearings, nor the sign of the difference is given",
-        ),
-        Statement(
-            "The differences may be attributed to the same factors as previously described with spring A.",
-            text("8.4.1.1, L6528"),
-            why="the measured curves are lost, and no size of the factors is given",
-        ),
+        at_least("difference, within a cycle", ALIKE, min(difference_from_constant(w, c) for w, c in each)),
+    )
+    yield statement(
+        "Other factors contributing to the difference are (a) only an average estimation of the damping coefficient is "
+        "considered in the theory and (b) the friction in the pin joints of the linkage is also ignored in the theory.",
+        "8.4.1.1, L6508",
+        why="neither the scatter of the coefficient, nor a size of the bearings, nor the sign of the difference is given",
+    )
+    yield statement(
+        "The differences may be attributed to the same factors as previously described with spring A.",
+        "8.4.1.1, L6528",
+        why="the measured curves are lost, and no size of the factors is given",
     )
 
 

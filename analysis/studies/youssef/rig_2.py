@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import sqrt
@@ -16,7 +16,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, harmonic_balance, slider_equation
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SMALL
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import Case, FloatArray, Statement, at_least, at_most, near, statement, unjudged
 from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from . import rigs
@@ -45,18 +45,15 @@ WIDTH = (
 # --- 8.18: the motion over the crank angle
 
 
-def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
-    """Return the ratio of the amplitude to the amplitude of a single mass under an unbalance (cm.kg).
-
-    The single mass is on the same spring and damper. Of the ratios at the speeds (rpm) the one farthest from 1 is returned.
-    """
+def _unbalance_ratio(spring: str, speeds: FloatArray, unbalance: float) -> float:
+    """Return the amplitude over that of a single mass under an unbalance (cm.kg), at the speed where it is farthest from 1."""
     rates = RAD_S_PER_RPM * speeds
     amplitudes = np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()])
     ratios = amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)
     return float(ratios[np.abs(ratios - 1.0).argmax()])
 
 
-def judge_motion() -> tuple[Statement, ...]:
+def judge_motion() -> Iterator[Statement]:
     """Return the statements on the motion of rig 2 over the crank angle, Fig 8.18."""
     section, speeds, span = "8.4.2.1", RANGE, (RANGE[0], RANGE[-1])
     sizes = {s: np.array([[rigs.harmonic(rigs.turn(s, w), n) for n in (1, 2)] for w in speeds]) for s in "CD"}
@@ -76,52 +73,46 @@ def judge_motion() -> tuple[Statement, ...]:
     shift = {s: _phase_range(harmonics) for s, harmonics in first.items()}
     why = "near half the natural frequency the second harmonic has its resonance"
     almost = f"{ABOUT:g}, the rule for *almost*"
-    return (
-        Statement(
-            "Typical experimentally observed slider oscillations are shown in Fig. (8.18) which exhibit an almost "
-            "sinusoidal behaviour with a phase shift and also periodic in one crank cycle.",
-            text(f"{section}, L6804"),
-            f"share of the speeds from {span[0]:g} to {span[1]:g} rpm, in steps of 10, at which the second harmonic is at most "
-            f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle at all these speeds",
-            f"{almost}; more than half of the speeds, as *typical* says; below 1, as at L6437",
-            (
-                *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
-                at_most("largest multiplier", 1.0, largest),
-            ),
-            "the phase shift is judged in the next sentence",
-        ),
-        Statement(
-            "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
-            "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
-            text(f"{section}, L6808"),
-            "greatest ratio of the second harmonic to the first over the range, in steps of 10 rpm, and of 1 rpm about the "
-            "greatest; change of the phase of the first harmonic over the range",
-            f"{almost}; 90 deg, our choice, half of the change of phase at a resonance",
-            (
-                *(at_most(f"spring {s}, second over first", ABOUT, most[s], why=why) for s in "CD"),
-                *(at_least(f"spring {s}, change of the phase", 90.0, shift[s], "deg") for s in "CD"),
-            ),
-        ),
-        Statement(
-            "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
-            "small in comparison and no evidence of the third and higher harmonics exists.",
-            text(f"{section}, L6814; again 8.4.2.2, L6968"),
-            "second harmonic relative to the first, as in the sentence before; greatest of the harmonics 3 to 6 relative to "
-            f"the greater of the two, the most from {span[0]:g} to {span[1]:g} rpm in steps of 10",
-            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *very small* and "
-            "*no evidence* too",
-            tuple(
-                at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
-                for s in "CD"
-                for words, bound, ratio in (
-                    ("the first dominant", 1.0, most),
-                    ("the second small", SMALL, most),
-                    ("the higher ones small", SMALL, higher),
-                )
-            ),
-        ),
-        *_like_one_mass(first, np.array(speeds), about),
+    yield statement(
+        "Typical experimentally observed slider oscillations are shown in Fig. (8.18) which exhibit an almost "
+        "sinusoidal behaviour with a phase shift and also periodic in one crank cycle.",
+        f"{section}, L6804",
+        f"share of the speeds from {span[0]:g} to {span[1]:g} rpm, in steps of 10, at which the second harmonic is at most "
+        f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle at all these speeds",
+        f"{almost}; more than half of the speeds, as *typical* says; below 1, as at L6437",
+        *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
+        at_most("largest multiplier", 1.0, largest),
+        why="the phase shift is judged in the next sentence",
     )
+    yield statement(
+        "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
+        "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
+        f"{section}, L6808",
+        "greatest ratio of the second harmonic to the first over the range, in steps of 10 rpm, and of 1 rpm about the "
+        "greatest; change of the phase of the first harmonic over the range",
+        f"{almost}; 90 deg, our choice, half of the change of phase at a resonance",
+        *(at_most(f"spring {s}, second over first", ABOUT, most[s], why=why) for s in "CD"),
+        *(at_least(f"spring {s}, change of the phase", 90.0, shift[s], "deg") for s in "CD"),
+    )
+    yield statement(
+        "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
+        "small in comparison and no evidence of the third and higher harmonics exists.",
+        f"{section}, L6814; again 8.4.2.2, L6968",
+        "second harmonic relative to the first, as in the sentence before; greatest of the harmonics 3 to 6 relative to "
+        f"the greater of the two, the most from {span[0]:g} to {span[1]:g} rpm in steps of 10",
+        f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, which we use for *very small* and "
+        "*no evidence* too",
+        *(
+            at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
+            for s in "CD"
+            for words, bound, ratio in (
+                ("the first dominant", 1.0, most),
+                ("the second small", SMALL, most),
+                ("the higher ones small", SMALL, higher),
+            )
+        ),
+    )
+    yield from _like_one_mass(first, np.array(speeds), about)
 
 
 def _phase_range(harmonics: NDArray[np.complex128]) -> float:
@@ -130,8 +121,8 @@ def _phase_range(harmonics: NDArray[np.complex128]) -> float:
 
 
 def _like_one_mass(
-    first: Mapping[str, NDArray[np.complex128]], speeds: NDArray[np.float64], about: Mapping[str, Sequence[float]]
-) -> tuple[Statement, ...]:
+    first: Mapping[str, NDArray[np.complex128]], speeds: FloatArray, about: Mapping[str, Sequence[float]]
+) -> Iterator[Statement]:
     """Compare the motion of rig 2 with that of a damped mass on a spring.
 
     ``first`` has the first harmonic (cm, complex) at the speeds (rpm) by spring; ``about`` has further speeds near half the
@@ -146,28 +137,28 @@ def _like_one_mass(
         spread.append(at_most(f"spring {s}, F0 over the square", ABOUT, np.ptp(unbalance) / unbalance.mean()))
         ratio = _unbalance_ratio(s, np.unique([*speeds, *about[s]]), float(unbalance.mean()))
         beyond.append(near(f"spring {s}, amplitude", 1.0, ratio, ABOUT))
-    return (
-        Statement(
-            "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
-            "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
-            text("8.4.2.1, L6820"),
-            "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves "
-            "as the first harmonic of u does, from 300 to 1000 rpm in steps of 10: greatest F0 divided by the least, and "
-            "range of phi. We read both as constant over the speed",
-            f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
-            (*constant, *phase),
-            "F0 grows with the square of the speed, as under an unbalance, see L6970",
-        ),
-        Statement(
-            "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
-            text("8.4.2.2, L6970"),
-            "F0 (L6820) divided by the square of the speed: its range relative to its mean. Then the amplitude of the "
-            "slider, relative to that of such a system under an unbalance whose force is this mean times the square of the "
-            "speed: the ratio farthest from 1, from 300 to 1000 rpm, as at L6808",
-            f"{ABOUT:g}, the rule for *similar*",
-            (*spread, *beyond),
-            "near half the natural frequency the second harmonic adds to the first",
-        ),
+    yield statement(
+        "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
+        "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
+        "8.4.2.1, L6820",
+        "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves "
+        "as the first harmonic of u does, from 300 to 1000 rpm in steps of 10: greatest F0 divided by the least, and "
+        "range of phi. We read both as constant over the speed",
+        f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
+        *constant,
+        *phase,
+        why="F0 grows with the square of the speed, as under an unbalance, see L6970",
+    )
+    yield statement(
+        "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
+        "8.4.2.2, L6970",
+        "F0 (L6820) divided by the square of the speed: its range relative to its mean. Then the amplitude of the "
+        "slider, relative to that of such a system under an unbalance whose force is this mean times the square of the "
+        "speed: the ratio farthest from 1, from 300 to 1000 rpm, as at L6808",
+        f"{ABOUT:g}, the rule for *similar*",
+        *spread,
+        *beyond,
+        why="near half the natural frequency the second harmonic adds to the first",
     )
 
 
@@ -208,10 +199,7 @@ def compute_resonance(spring: str) -> StudyResult:
 
 @cache
 def width(spring: str, linear: Variant | None = None, /, **changes: float) -> float:
-    """Return the width of the resonance (rpm), defined in `WIDTH`.
-
-    It follows from the full equations, with changes of the rig, or from the variant ``linear`` of the linear equation.
-    """
+    """Return the width of the resonance (rpm), see `WIDTH`, by the full equations, with changes, or by a linear equation."""
     speeds = rigs.natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
         sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
@@ -223,7 +211,7 @@ def width(spring: str, linear: Variant | None = None, /, **changes: float) -> fl
     return float(np.ptp(fine[shape >= shape.max() / sqrt(2.0)]))
 
 
-def _beyond_resonance() -> tuple[Statement, ...]:
+def _beyond_resonance() -> Iterator[Statement]:
     """Judge the statements on the amplitude of Fig 8.19 and 8.20 up to resonance and beyond it."""
     section, larger = "8.4.2.2", "above 1, the sign alone, as *smaller* says"
     over, exact = {}, []
@@ -238,45 +226,40 @@ def _beyond_resonance() -> tuple[Statement, ...]:
             for w in BEYOND[s]
         ]
     beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
-    return (
-        Statement(
-            "The experimental and theoretical curves agree in the region of speed leading up to resonance at [omega = "
-            "omega_n].",
-            text(f"{section}, L6837"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "However the width of the resonance region and the amplitude of vibration beyond resonance obtained from the "
-            "theory is smaller than that of the experiment but, nevertheless, a reasonable agreement is evident.",
-            text(f"{section}, L6841"),
-            why=rigs.LOST,
-        ),
-        Statement(
-            "These differences may however be attributed to the fact that quantities involving the second and higher orders "
-            "of [xi3, xi4] and [sigma2], and their derivatives are ignored in the theory.",
-            text(f"{section}, L6847"),
-            f"amplitude beyond resonance, at {beyond} (our choice), and {WIDTH}. Each is taken by the full equations and "
-            "divided by its value by two harmonics of the linear equation, corrected, with sigma2 to first or second order; "
-            "the greatest ratio is listed",
-            larger,
-            tuple(at_least(label, 1.0, max(ratios)) for label, ratios in over.items()),
-            "what is ignored lowers the amplitude and narrows the resonance. The orders of xi alone raise the amplitude, by "
-            f"{100.0 * (min(exact) - 1.0):.2f} to {100.0 * (max(exact) - 1.0):.2f} % of that by the linear equation with all "
-            "orders of sigma2 and all harmonics",
-        ),
-        Statement(
-            "Other factors contributing to the differences may, as before, be attributed to the presence of Coloumb "
-            "friction in the guide and pin joints and to the fact that only an average value of the damping is considered "
-            "in the theory.",
-            text(f"{section}, L6853"),
-            "amplitude and width of the sentence before, by the full equations with one factor, divided by those without it; "
-            f"the least ratio of both springs. The factors (our sizes): friction by {rigs.SLIGHT:g} of the guide's force, a "
-            f"friction radius of {1e3 * PIN_RADIUS:g} mm in the pins, a damper "
-            f"{' or '.join(f'{d:g}' for d in DAMPERS)} times as strong",
-            larger,
-            _factors(),
-            "no one factor does both",
-        ),
+    yield statement(
+        "The experimental and theoretical curves agree in the region of speed leading up to resonance at [omega = omega_n].",
+        f"{section}, L6837",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "However the width of the resonance region and the amplitude of vibration beyond resonance obtained from the "
+        "theory is smaller than that of the experiment but, nevertheless, a reasonable agreement is evident.",
+        f"{section}, L6841",
+        why=rigs.LOST,
+    )
+    yield statement(
+        "These differences may however be attributed to the fact that quantities involving the second and higher orders "
+        "of [xi3, xi4] and [sigma2], and their derivatives are ignored in the theory.",
+        f"{section}, L6847",
+        f"amplitude beyond resonance, at {beyond} (our choice), and {WIDTH}. Each is taken by the full equations and "
+        "divided by its value by two harmonics of the linear equation, corrected, with sigma2 to first or second order; "
+        "the greatest ratio is listed",
+        larger,
+        *(at_least(label, 1.0, max(ratios)) for label, ratios in over.items()),
+        why="what is ignored lowers the amplitude and narrows the resonance. The orders of xi alone raise the amplitude, by "
+        f"{100.0 * (min(exact) - 1.0):.2f} to {100.0 * (max(exact) - 1.0):.2f} % of that by the linear equation with all "
+        "orders of sigma2 and all harmonics",
+    )
+    yield statement(
+        "Other factors contributing to the differences may, as before, be attributed to the presence of Coloumb friction in "
+        "the guide and pin joints and to the fact that only an average value of the damping is considered in the theory.",
+        f"{section}, L6853",
+        "amplitude and width of the sentence before, by the full equations with one factor, divided by those without it; the "
+        f"least ratio of both springs. The factors (our sizes): friction by {rigs.SLIGHT:g} of the guide's force, a friction "
+        f"radius of {1e3 * PIN_RADIUS:g} mm in the pins, a damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as strong",
+        larger,
+        *_factors(),
+        why="no one factor does both",
     )
 
 
@@ -288,72 +271,57 @@ def linear_error(spring: str, order: Variant) -> float:
     )
 
 
-def _natural_frequencies() -> tuple[Statement, ...]:
+def _natural_frequencies() -> Iterator[Statement]:
     """Judge the statements on the natural frequencies of Fig 8.19 and 8.20, and on the linear theory as a whole."""
     section = "8.4.2.2"
     natural = {s: rigs.natural_speed(s) for s in "CD"}
     around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.stiffness_range(s)] for s in "CD"}
-    return (
-        Statement(
-            "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
-            "of 825 RPM with spring D.",
-            text(f"{section}, L6861"),
-            "speed of the greatest amplitude by the full equations",
-            f"{100 * ABOUT:g} %, the rule for *in the region of*",
-            tuple(
-                near(
-                    f"spring {s}",
-                    NATURAL[s][0],
-                    rigs.maximum_near_fraction(s, 1)[0],
-                    ABOUT * float(NATURAL[s][0]),
-                    "rpm",
-                )
-                for s in "CD"
-            ),
+    yield statement(
+        "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
+        "of 825 RPM with spring D.",
+        f"{section}, L6861",
+        "speed of the greatest amplitude by the full equations",
+        f"{100 * ABOUT:g} %, the rule for *in the region of*",
+        *(
+            near(f"spring {s}", NATURAL[s][0], rigs.maximum_near_fraction(s, 1)[0], ABOUT * float(NATURAL[s][0]), "rpm")
+            for s in "CD"
         ),
-        Statement(
-            "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
-            "are 582 and 829 for springs C and D respectively.",
-            text(f"{section}, L6865"),
-            "natural frequency by the mean effective mass, the nearest to the stated one that the rounding of the printed "
-            "stiffness (one digit) allows. Then the printed frequency of the sentence before, relative to that with the "
-            "stiffness as printed",
-            f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, the rule for *the same*, which we use for *good agreement*",
-            (
-                *(
-                    near(
-                        f"spring {s}, calculated; rounded {' to '.join(f'{speed:.1f}' for speed in around[s])}",
-                        NATURAL[s][1],
-                        np.clip(float(NATURAL[s][1]), min(around[s]), max(around[s])),
-                        unit="rpm",
-                    )
-                    for s in "CD"
-                ),
-                *(
-                    near(f"spring {s}, shown over calculated", 1.0, float(NATURAL[s][0]) / natural[s], ALIKE)
-                    for s in "CD"
-                ),
-            ),
-            f"with the stiffness as printed, they are {natural['C']:.1f} and {natural['D']:.1f} rpm",
+    )
+    yield statement(
+        "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
+        "are 582 and 829 for springs C and D respectively.",
+        f"{section}, L6865",
+        "natural frequency by the mean effective mass, the nearest to the stated one that the rounding of the printed "
+        "stiffness (one digit) allows. Then the printed frequency of the sentence before, relative to that with the "
+        "stiffness as printed",
+        f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, the rule for *the same*, which we use for *good agreement*",
+        *(
+            near(
+                f"spring {s}, calculated; rounded {' to '.join(f'{speed:.1f}' for speed in around[s])}",
+                NATURAL[s][1],
+                np.clip(float(NATURAL[s][1]), min(around[s]), max(around[s])),
+                unit="rpm",
+            )
+            for s in "CD"
         ),
-        Statement(
-            "[T]he theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
-            "the theory that the second and higher orders of [xi3] and [xi4] and their derivatives are negligible is "
-            "a reasonable assumption.",
-            text(f"{section}, L6974"),
-            "greatest relative error of the amplitude by two harmonics of the linear equation of chapter IV, corrected, from "
-            f"{RANGE[0]:g} to {RANGE[-1]:g} rpm in steps of 10: to first order of sigma2, as (4.21) has it, and to second",
-            f"{SMALL:g}, the rule for *negligible*",
-            (
-                *(
-                    at_most(f"spring {s}, {name} order", SMALL, linear_error(s, order), why=LACKS)
-                    for s in "CD"
-                    for name, order in ORDERS.items()
-                ),
-                Case(label="agreement with the experiment", computed=None, why=rigs.LOST),
-            ),
-            "L6887, that the results support chapter IV, rests on this row, L6814 and L6970",
+        *(near(f"spring {s}, shown over calculated", 1.0, float(NATURAL[s][0]) / natural[s], ALIKE) for s in "CD"),
+        why=f"with the stiffness as printed, they are {natural['C']:.1f} and {natural['D']:.1f} rpm",
+    )
+    yield statement(
+        "[T]he theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
+        "the theory that the second and higher orders of [xi3] and [xi4] and their derivatives are negligible is "
+        "a reasonable assumption.",
+        f"{section}, L6974",
+        "greatest relative error of the amplitude by two harmonics of the linear equation of chapter IV, corrected, from "
+        f"{RANGE[0]:g} to {RANGE[-1]:g} rpm in steps of 10: to first order of sigma2, as (4.21) has it, and to second",
+        f"{SMALL:g}, the rule for *negligible*",
+        *(
+            at_most(f"spring {s}, {name} order", SMALL, linear_error(s, order), why=LACKS)
+            for s in "CD"
+            for name, order in ORDERS.items()
         ),
+        unjudged("agreement with the experiment", rigs.LOST),
+        why="L6887, that the results support chapter IV, rests on this row, L6814 and L6970",
     )
 
 
@@ -407,10 +375,7 @@ HARMONICS = (1, 2, 3)
 
 
 def _greatest(spring: str, n: int, part: int, order: Variant) -> float:
-    """Return the greatest amplitude of the n-th harmonic of the linear equation, relative to l4.
-
-    It is sought near the natural frequency divided by ``part``.
-    """
+    """Return the linear equation's greatest n-th harmonic over l4 near the natural frequency divided by ``part``."""
     place = rigs.natural_speed(spring) / part
     found = minimize_scalar(
         lambda speed: -linear_motion(spring, float(speed), order).harmonic(n),
@@ -423,7 +388,7 @@ def _greatest(spring: str, n: int, part: int, order: Variant) -> float:
 
 def compute_harmonics() -> StudyResult:
     """Compute the first three harmonics relative to l4 over the speed, and the second by the linear equation too."""
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, FloatArray] = {}
     points = CURVE[::3]
     # the second harmonic is greatest at the natural frequency or at half of it, by the order of sigma2
     first, second = (
@@ -444,32 +409,32 @@ def compute_harmonics() -> StudyResult:
         claim="The second harmonic is smaller than the first by a factor of 50.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
                 "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
-                text("8.4.2.2, L6871"),
+                "8.4.2.2, L6871",
                 "maximum of the amplitude there minus the minimum that follows at a higher speed, relative to this minimum; "
                 "0 if the curve, in steps of at most 3 rpm there, has no maximum",
                 rigs.SEEN_IN_RECORDS,
-                tuple(
+                *(
                     at_most(f"spring {spring}, {part}", rigs.NOTICED, rigs.peak_rise(spring, n))
                     for spring in "CD"
                     for n, part in ((4, "quarter"), (3, "third"), (2, "half"))
                 ),
-                f"of these places only half the natural frequency with D, {rigs.natural_speed('D') / 2.0:.0f} rpm, lies "
+                why=f"of these places only half the natural frequency with D, {rigs.natural_speed('D') / 2.0:.0f} rpm, lies "
                 "within the range that was run (L6808). How far the motion is the first harmonic is judged at L6814",
             ),
-            Statement(
+            statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "
                 "Fig. (8.21). These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 "
                 "and hence are in agreement with the experiment.",
-                text("8.4.2.2, L6877-6885"),
+                "8.4.2.2, L6877-6885",
                 "greatest first harmonic divided by the greatest second harmonic, each at its own speed, by two harmonics of "
                 "the linear equation, corrected, to second order of sigma2, because the terms of (4.21) for a coupler with "
                 "mass are illegible in our scan. What the experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, since no digit after 50 is given",
-                tuple(near(f"spring {s}", "50", min(second[s]), ABOUT * 50.0) for s in "CD"),
-                "the second harmonic is about 1.5 times as large as a fiftieth of the first. To first order of sigma2, as "
+                *(near(f"spring {s}", "50", min(second[s]), ABOUT * 50.0) for s in "CD"),
+                why="the second harmonic is about 1.5 times as large as a fiftieth of the first. To first order of sigma2, as "
                 "(4.21) has it, the second harmonic is greatest at the natural frequency, and the factor is "
                 f"{min(first['C']):.0f} with C and {min(first['D']):.0f} with D; by its maximum at half this frequency it is "
                 f"{first['C'][1]:.0f} and {first['D'][1]:.0f}",
@@ -527,7 +492,7 @@ TORQUES = ("greatest crank torque", "mean crank torque")
 
 def compute_forces() -> StudyResult:
     """Compute the crank torque and the pin forces over the speed."""
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, FloatArray] = {}
     for spring in "CD":
         name, branch = f"spring {spring}", rigs.motions(spring).branches[0]
         table, speeds = branch.columns(), rigs.rpm(branch)

@@ -30,6 +30,7 @@ from ...periodic import (
 )
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ALIKE
+from ..statements import FloatArray
 from ..study import StudyResult
 from ..variation import cache, vary
 
@@ -98,7 +99,7 @@ def resonant_b() -> Response:
     return response("B", SPLIT, FASTEST["B"], COARSE)
 
 
-def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64] | None = None) -> PeriodicOrbit:
+def orbit(parameters: FiveBarParameters, speed: float, start: FloatArray | None = None) -> PeriodicOrbit:
     """Find the periodic motion at a speed (rpm), near the state ``start`` if it is given."""
     return find_orbit(parameters, speed=speed * RAD_S_PER_RPM, start=start)
 
@@ -111,17 +112,14 @@ def turn(spring: str, speed: float, **changes: float) -> Turn:
     return orbit(rig(spring, **changes), speed, start).turn(SAMPLES)
 
 
-def slider(motion: Turn) -> NDArray[np.float64]:
+def slider(motion: Turn) -> FloatArray:
     """Return the slider position over a turn (cm), with its first value repeated at the end."""
     u = CM_PER_METRE * motion["slider.position"]
     return np.append(u, u[0])
 
 
-def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Return the complex dynamic stiffness (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s).
-
-    It is the force divided by the displacement.
-    """
+def complex_stiffness(p: FiveBarParameters, rates: FloatArray) -> NDArray[np.complex128]:
+    """Return force over displacement (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
     return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
@@ -130,7 +128,7 @@ def amplitude(motion: Turn) -> float:
     return CM_PER_METRE * motion.amplitude
 
 
-def count_sign_changes(x: NDArray[np.float64]) -> int:
+def count_sign_changes(x: FloatArray) -> int:
     """Count the changes of sign of a periodic sequence."""
     return int(np.sum(np.sign(x) != np.sign(np.roll(x, 1))))
 
@@ -154,7 +152,7 @@ def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def rpm(branch: Branch) -> NDArray[np.float64]:
+def rpm(branch: Branch) -> FloatArray:
     """Return the speeds along a branch (rpm)."""
     return branch.parameter / RAD_S_PER_RPM
 
@@ -172,10 +170,7 @@ def maximum_near_fraction(spring: str, order: int) -> tuple[float, float]:
 
 
 def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
-    """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the minimum that follows.
-
-    ``stiffness`` is the spring's stiffness (N/m).
-    """
+    """Return the speeds (rpm) of the maximum near half the natural frequency, for a stiffness (N/m), and the next minimum."""
     place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
     found = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
     top, _ = only_extremum(found.maxima(), 0.9 * place, 1.1 * place)
@@ -183,10 +178,7 @@ def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
 
 
 def peak_rise(spring: str, order: int) -> float:
-    """Return the amplitude's maximum near 1/order of the natural frequency divided by the minimum that follows, minus 1.
-
-    The result is 0 without such a maximum.
-    """
+    """Return the maximum near 1/order of the natural frequency over the next minimum, minus 1; 0 if there is none."""
     place = natural_speed(spring) / order
     found = response(spring, 0.9 * place, 1.25 * place, COARSE)
     tops = [e for e in found.maxima() if e.parameter < 1.1 * place * RAD_S_PER_RPM]
@@ -201,16 +193,13 @@ def overtones(motion: Turn) -> float:
 
 
 @cache
-def friction_amplitudes(spring: str, coefficient: float) -> NDArray[np.float64]:
+def friction_amplitudes(spring: str, coefficient: float) -> FloatArray:
     """Return the amplitude (cm) at the speeds of `GRID` with a coefficient of friction in the guide."""
     return follow_amplitude(spring, GRID[spring].tolist(), slider_friction_coefficient=coefficient)
 
 
-def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np.float64]:
-    """Return the amplitude (cm) at each speed (rpm) with changes of the rig.
-
-    Each motion is found from the motion at the previous speed.
-    """
+def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> FloatArray:
+    """Return the amplitude (cm) at each speed (rpm) with changes of the rig, found from the motion at the speed before."""
     parameters, start, found = rig(spring, **changes), orbit(rig(spring), speeds[0]).start, []
     for speed in speeds:
         motion = orbit(parameters, speed, start)
@@ -219,11 +208,8 @@ def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> 
     return np.array(found)
 
 
-def branch_columns(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
-    """Return the amplitude along a branch as columns, with stable and unstable parts in separate columns.
-
-    `curves_over_speed` turns these columns into curves.
-    """
+def branch_columns(branch: Branch, name: str) -> dict[str, FloatArray]:
+    """Return the amplitude along a branch as columns for `curves_over_speed`, its stable and unstable parts apart."""
     amplitude = CM_PER_METRE * branch.amplitude
     stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])
     # a dashed part begins and ends on the solid one

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
@@ -21,6 +20,7 @@ from ...display import format_count
 from ...run import Inputs, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ALIKE
+from ..statements import FloatArray
 from ..variation import cache, vary
 
 #: Crank speed of chapter III (rpm).
@@ -38,10 +38,7 @@ SETTLING_TIME = 8.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
-    """Return the parameters of Table 3.1 with this spring (dyn/cm), damper (dyn.s/cm) and gravity (m/s2).
-
-    The reader's changes are applied last.
-    """
+    """Return Table 3.1 with a spring (dyn/cm), damper (dyn.s/cm) and gravity (m/s2), then with the reader's changes."""
     return vary(
         replace(
             TABLE_3_1,
@@ -72,9 +69,9 @@ class SteadyTurn:
     (cm).
     """
 
-    angle_deg: NDArray[np.float64]
-    slider_cm: NDArray[np.float64]
-    torque: NDArray[np.float64]
+    angle_deg: FloatArray
+    slider_cm: FloatArray
+    torque: FloatArray
     change: float
 
     @property
@@ -105,24 +102,21 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
     )
 
 
-def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Return abscissa and value of the minimum of evenly spaced samples, by a parabola.
-
-    The parabola passes through the lowest sample and the samples beside it.
-    """
+def least(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return abscissa and value of the minimum of even samples, by a parabola through the lowest and its neighbours."""
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1 : i + 2]
     shift = 0.5 * (a - c) / (a - 2.0 * b + c)
     return float(x[i] + shift * (x[i + 1] - x[i])), float(b - 0.25 * (a - c) * shift)
 
 
-def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+def greatest(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Return abscissa and value of the maximum of evenly spaced samples, by a parabola; see `least`."""
     place, value = least(x, -y)
     return place, -value
 
 
-def greatest_ratio(values: NDArray[np.float64]) -> float:
+def greatest_ratio(values: FloatArray) -> float:
     """Return the greatest ratio of a value to its predecessor; raise an InputError for fewer than two values."""
     if len(values) < 2:
         raise InputError(
@@ -131,6 +125,6 @@ def greatest_ratio(values: NDArray[np.float64]) -> float:
     return float((values[1:] / values[:-1]).max())
 
 
-def distance_from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def distance_from_line(x: FloatArray, y: FloatArray) -> float:
     """Return the greatest distance in y between a curve from (0, 0) to (1, 1) and the best line parallel to its chord."""
     return 0.5 * float(np.ptp(y - x))

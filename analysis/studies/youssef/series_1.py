@@ -7,7 +7,7 @@ can follow at speed. The direct search with eleven terms (b) has no vertical tan
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
@@ -23,11 +23,10 @@ from ...numerics.fourier import FourierSeries
 from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import MachineSpec, Search, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible
-from ..statements import Case, Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement, unjudged
 from ..study import Study, StudyResult, pad_columns
 from .chapter_7 import FAMILY, LINKAGE, TARGET, TURN, coupler_point, path_curve, plane, pointing_positions, slider, xy
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 #: Crank angles of the desired points, and a mask of the points on p1 p2.
@@ -75,12 +74,7 @@ def squared_errors(found: Solution) -> tuple[float, float]:
 
 
 def all_terms_excess(curves: int = 20, seed: int = 11) -> float:
-    """Return the greatest value of e_F / e_V - 1 over random desired curves.
-
-    e_F and e_V are the sums of squared errors of a Fourier series and of the variational motion. The series has as many terms
-    as there are points and interpolates the variational motion. The desired curves are points scattered about random positions
-    of P.
-    """
+    """Return the greatest excess of the best series' squared error over the variational one, see L5768, for random curves."""
     # off the axis, where the slider can come below the crank pin and the links then have no direction
     random, steps, found = np.random.default_rng(seed), turn(73), []
     rotation = steps + 0.02
@@ -106,10 +100,7 @@ def vertical_tangents() -> list[float]:
 
 
 def solve_slider_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Solve eq (7.14) for U with both signs of its square root, or (7.15) where (7.14) has no real root.
-
-    Returns U, shape (n, 2), and a mask of the points where (7.15) is used.
-    """
+    """Return U, shape (n, 2), by both signs of (7.14), or by (7.15) where it has no real root, and a mask of these points."""
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     first, square = pointing_positions(rotation, target)
     upright = square < 0.0
@@ -132,15 +123,13 @@ def curve_wanted() -> StudyResult:
     assert reached.all()
     return StudyResult(
         claim="The desired curve is given by numbers, depends on time, and lies within the family of Fig 7.2.",
-        assignment=(
-            "The curve is lost. Ours consists of the places of P at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad "
-            "ahead, at 72 crank angles; p1 p2 is the part from 150 to 210 deg."
-        ),
+        assignment="The curve is lost. Ours consists of the places of P at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 "
+        "rad ahead, at 72 crank angles; p1 p2 is the part from 150 to 210 deg.",
         columns=pad_columns(columns),
         statements=(
-            Statement(
+            statement(
                 "It is time dependent and is obtained from within the envelope shown in Fig. (7.2).",
-                text("7.3.1, L5569"),
+                "7.3.1, L5569",
                 why="the figure is lost, and no number of it is in the text",
             ),
         ),
@@ -162,10 +151,7 @@ def draw_wanted(result: StudyResult) -> Figure:
 
 
 def least_distance(rotation: float, target: complex) -> tuple[float, float]:
-    """Return the least distance of P from a target at a crank rotation, over the slider `POSITIONS` and both assemblies.
-
-    The second result is the distance that P moves from this nearest point to the adjacent slider position.
-    """
+    """Return P's least distance from a target over `POSITIONS` and assemblies, and how far P moves from one to the next."""
     crank, found = np.full(POSITIONS.size, rotation), []
     for branch in (1, -1):
         path = replace(LINKAGE, branch=branch).path(crank, (POSITIONS, np.zeros_like(POSITIONS))) @ np.array([1.0, 1j])
@@ -186,15 +172,13 @@ def two_positions() -> StudyResult:
     for name, end in zip(("U1", "U2"), u[k]):
         columns |= xy(name, np.array([joint, end + 0j]))
     return StudyResult(
-        claim=(
-            "The coupler points at the desired point, with the rocker in either of two positions; otherwise the rocker is "
-            "upright."
-        ),
+        claim="The coupler points at the desired point, with the rocker in either of two positions; otherwise the rocker is "
+        "upright.",
         assignment=f"{SERIES_1} The figure is drawn with the crank at {degrees(ROTATION[k]):.0f} deg. The statements are "
         f"judged with {ROTATION.size} random points, one for every {360 / ROTATION.size:g} deg of the crank, no "
         "farther from A than l3 along either axis.",
         columns=pad_columns(columns),
-        statements=_positions(),
+        statements=tuple(_positions()),
     )
 
 
@@ -207,7 +191,7 @@ def _upright_errors(rotation: FloatArray, places: ComplexArray) -> FloatArray:
     return np.asarray(np.abs(reached - places[:, None]).min(axis=1))
 
 
-def _positions() -> tuple[Statement, ...]:
+def _positions() -> Iterator[Statement]:
     """Judge (7.14) and (7.15) with random points."""
     targets = np.random.default_rng(75).uniform(-1.0, 1.0, (ROTATION.size, 2))
     places = targets @ np.array([1.0, 1j])
@@ -228,63 +212,55 @@ def _positions() -> tuple[Statement, ...]:
         f"{side.sum()} points {where}" for side, where in ((above, "above the slider's line"), (~above, "below it"))
     ]
     hangs = "below the line the rocker hangs, and no upright rocker can be assembled"
-    return (
-        Statement(
-            "[Equation (7.12)] corresponds to the relation that for minimum error the coupler takes the position of a "
-            "straight line with the point p(x*, y*).",
-            text("7.3.1, L5628"),
-            f"error with the coupler pointing at the point minus the least error of {POSITIONS.size} slider positions (u "
-            f"from {POSITIONS[0]:g} to {POSITIONS[-1]:g} l3) and both assemblies: the greatest difference at the {off.size} "
-            "points where (7.14) has a real root",
-            fine.format(moved[~missing].max()),
-            (at_most("greatest difference", 1e-3, off.max(), "l3"),),
+    yield statement(
+        "[Equation (7.12)] corresponds to the relation that for minimum error the coupler takes the position of a "
+        "straight line with the point p(x*, y*).",
+        "7.3.1, L5628",
+        f"error with the coupler pointing at the point minus the least error of {POSITIONS.size} slider positions (u "
+        f"from {POSITIONS[0]:g} to {POSITIONS[-1]:g} l3) and both assemblies: the greatest difference at the {off.size} "
+        "points where (7.14) has a real root",
+        fine.format(moved[~missing].max()),
+        at_most("greatest difference", 1e-3, off.max(), "l3"),
+    )
+    yield statement(
+        "If the argument of the square root term in (7.14) is negative then [(7.11a)] is not true and [(7.11b)] is the "
+        "correct solution of [(7.10b)]. In physical reality this is equivalent to the coupler being in a straight line "
+        "with the desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
+        "7.3.1, L5675-5685",
+        f"at the {standing.size} points where it is negative: least distance of C from the slider's line, relative to "
+        "l4, with the coupler pointing at the point. Then, at the least error, the share of rockers perpendicular to "
+        f"the line, as (7.11b), cos th4 = 0, says: size of sin th4 above {UPRIGHT:g}",
+        "more than 1, since a rocker of length l4 then does not reach the line; none for the share",
+        at_least("distance of C", 1.0, heights.min()),
+        near("cos th4 = 0", 1.0, np.mean(np.abs(upright) > UPRIGHT), 0.0),
+    )
+    yield statement(
+        "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
+        "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
+        "7.3.1, L5685",
+        f"at the {standing.size} points where (7.14) has no real root: share of upright rockers, sin th4 > {UPRIGHT:g}, "
+        "at the least error. Then the greatest difference between the error with the better U of (7.15) and the least "
+        "error of the slider positions above",
+        f"none for the share, as *must surely be* says; {fine.format(moved[missing].max())}",
+        near(f"upright, the {lines[0]}", 1.0, standing[above].mean(), 0.0),
+        near(f"upright, the {lines[1]}", 1.0, standing[~above].mean(), 0.0, why=hangs),
+        at_most("error by (7.15), above the line", 1e-3, by_7_15[above].max(), "l3"),
+    )
+    yield statement(
+        "Now since a true global optimum may be found readily at first trial from the variational method, one may "
+        "argue the philosophy behind the use of any other method.",
+        "7.3.1, L5772-5776",
+        "share of the points at which U gives the least error of the slider positions above. U is solved once by "
+        "(7.14), or is the better U of (7.15) where (7.14) has no real root",
+        f"{fine.format(moved.max())}; none for the share",
+        at_least(f"(7.14), {off.size} points", 1.0, np.mean(off <= 1e-3)),
+        at_least(
+            f"(7.15), {standing.size} points",
+            1.0,
+            np.mean(by_7_15 <= 1e-3),
+            why="below the slider's line (7.15) has no real U",
         ),
-        Statement(
-            "If the argument of the square root term in (7.14) is negative then [(7.11a)] is not true and [(7.11b)] is the "
-            "correct solution of [(7.10b)]. In physical reality this is equivalent to the coupler being in a straight line "
-            "with the desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
-            text("7.3.1, L5675-5685"),
-            f"at the {standing.size} points where it is negative: least distance of C from the slider's line, relative to "
-            "l4, with the coupler pointing at the point. Then, at the least error, the share of rockers perpendicular to "
-            f"the line, as (7.11b), cos th4 = 0, says: size of sin th4 above {UPRIGHT:g}",
-            "more than 1, since a rocker of length l4 then does not reach the line; none for the share",
-            (
-                at_least("distance of C", 1.0, heights.min()),
-                near("cos th4 = 0", 1.0, np.mean(np.abs(upright) > UPRIGHT), 0.0),
-            ),
-        ),
-        Statement(
-            "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
-            "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
-            text("7.3.1, L5685"),
-            f"at the {standing.size} points where (7.14) has no real root: share of upright rockers, sin th4 > {UPRIGHT:g}, "
-            "at the least error. Then the greatest difference between the error with the better U of (7.15) and the least "
-            "error of the slider positions above",
-            f"none for the share, as *must surely be* says; {fine.format(moved[missing].max())}",
-            (
-                near(f"upright, the {lines[0]}", 1.0, standing[above].mean(), 0.0),
-                near(f"upright, the {lines[1]}", 1.0, standing[~above].mean(), 0.0, why=hangs),
-                at_most("error by (7.15), above the line", 1e-3, by_7_15[above].max(), "l3"),
-            ),
-        ),
-        Statement(
-            "Now since a true global optimum may be found readily at first trial from the variational method, one may "
-            "argue the philosophy behind the use of any other method.",
-            text("7.3.1, L5772-5776"),
-            "share of the points at which U gives the least error of the slider positions above. U is solved once by "
-            "(7.14), or is the better U of (7.15) where (7.14) has no real root",
-            f"{fine.format(moved.max())}; none for the share",
-            (
-                at_least(f"(7.14), {off.size} points", 1.0, np.mean(off <= 1e-3)),
-                at_least(
-                    f"(7.15), {standing.size} points",
-                    1.0,
-                    np.mean(by_7_15 <= 1e-3),
-                    why="below the slider's line (7.15) has no real U",
-                ),
-            ),
-            "*one may argue* is not judged, since it claims nothing",
-        ),
+        why="*one may argue* is not judged, since it claims nothing",
     )
 
 
@@ -324,87 +300,75 @@ def columns_of_motions() -> dict[str, FloatArray]:
     return pad_columns(columns | xy("desired", desired_points()))
 
 
-def _unweighted() -> tuple[Statement, ...]:
+def _unweighted() -> Iterator[Statement]:
     """Return the statements on Fig 7.6 to 7.8."""
     vertical = " and ".join(f"{at:.1f}" for at in vertical_tangents())
     excess = search_directly().error / variational().squared_error
-    return (
-        Statement(
-            "Different initial guesses of the coefficients produced different optima.",
-            text("7.3.1, L5743"),
-            why=f"{LOST}, and the guesses are not printed",
-        ),
-        Statement(
-            "The variational method located the true global optimum which the direct search located as best as an "
-            "eleven-term Fourier series could provide.",
-            text("7.3.1, L5764"),
-            why=(
-                f"{LOST}. With ours, the best eleven terms have {excess:.2f} times the squared error of the variational "
-                "motion"
-            ),
-        ),
-        Statement(
-            "If an infinite number of terms were used the direct search would have led to the variational results.",
-            text("7.3.1, L5768"),
-            "squared error of the series with as many terms as there are desired points, divided by that of the variational "
-            "method, less 1. This series takes the variational U at each point. The greatest value for 20 random curves of "
-            "73 points (our choice)",
-            "1e-9, for rounding errors",
-            (
-                at_most("the best series", 1e-9, all_terms_excess()),
-                Case(label="the series found", computed=None, why="no search has infinitely many coefficients"),
-            ),
-        ),
-        Statement(
-            "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high speeds "
-            "while curve (b) of the same figure is a more feasible task.",
-            text("7.3.1, L5789"),
-            why=f"{LOST}; with ours (a) has a vertical tangent at {vertical} deg, where its velocity has no bound",
-        ),
-        Statement(
-            "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
-            "greater effort than would otherwise be needed with a direct search. In fact, in some cases, the direct search "
-            "method is required to solve these equations.",
-            text("7.3.1, L5883-5891"),
-            "number of equations for this mechanism: three by (7.6), for theta3, theta4 and U, and the two of the closure "
-            "(7.7)",
-            "none, since counts are exact",
-            (
-                replace(near("equations", 5.0, 3 + 2, 0.0), stated="n + m"),
-                Case(label="effort", computed=None, why="the effort of neither method is stated"),
-                Case(label="direct search required", computed=None, why="no such case is given"),
-            ),
-            "one of the five, (7.10c), is linear: lambda1 = 0. The thesis then solves them one after another (L5607-5640). "
-            "We read *non-linear* as said of the set",
-        ),
+    yield statement(
+        "Different initial guesses of the coefficients produced different optima.",
+        "7.3.1, L5743",
+        why=f"{LOST}, and the guesses are not printed",
+    )
+    yield statement(
+        "The variational method located the true global optimum which the direct search located as best as an "
+        "eleven-term Fourier series could provide.",
+        "7.3.1, L5764",
+        why=f"{LOST}. With ours, the best eleven terms have {excess:.2f} times the squared error of the variational motion",
+    )
+    yield statement(
+        "If an infinite number of terms were used the direct search would have led to the variational results.",
+        "7.3.1, L5768",
+        "squared error of the series with as many terms as there are desired points, divided by that of the variational "
+        "method, less 1. This series takes the variational U at each point. The greatest value for 20 random curves of "
+        "73 points (our choice)",
+        "1e-9, for rounding errors",
+        at_most("the best series", 1e-9, all_terms_excess()),
+        unjudged("the series found", "no search has infinitely many coefficients"),
+    )
+    yield statement(
+        "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high speeds "
+        "while curve (b) of the same figure is a more feasible task.",
+        "7.3.1, L5789",
+        why=f"{LOST}; with ours (a) has a vertical tangent at {vertical} deg, where its velocity has no bound",
+    )
+    yield statement(
+        "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
+        "greater effort than would otherwise be needed with a direct search. In fact, in some cases, the direct search "
+        "method is required to solve these equations.",
+        "7.3.1, L5883-5891",
+        "number of equations for this mechanism: three by (7.6), for theta3, theta4 and U, and the two of the closure (7.7)",
+        "none, since counts are exact",
+        replace(near("equations", 5.0, 3 + 2, 0.0), stated="n + m"),
+        unjudged("effort", "the effort of neither method is stated"),
+        unjudged("direct search required", "no such case is given"),
+        why="one of the five, (7.10c), is linear: lambda1 = 0. The thesis then solves them one after another (L5607-5640). "
+        "We read *non-linear* as said of the set",
     )
 
 
-def _weighted() -> tuple[Statement, ...]:
+def _weighted() -> Iterator[Statement]:
     """Return the statements on Fig 7.9 and 7.10."""
     inside, outside = (
         new / old for new, old in zip(squared_errors(search_directly(WEIGHT)), squared_errors(search_directly()))
     )
-    return (
-        Statement(
-            "The direct search permits an easier use of stricter error conditions or constraints at some portion of a desired "
-            "function.",
-            text("7.3.1, L5797-5799"),
-            why="there is no measure of *easier*",
-        ),
-        Statement(
-            "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger errors "
-            "are tolerated outside it.",
-            text("7.3.1, L5834"),
-            why=f"{LOST}. With ours, the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, and on the "
-            f"rest by a factor of {outside:.2f}",
-        ),
-        Statement(
-            "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller motion U "
-            "involved there, may be modified further to give a more favourable dynamic condition.",
-            text("7.3.1, L5838"),
-            why="there is no measure of *very relaxed* and *more favourable*",
-        ),
+    yield statement(
+        "The direct search permits an easier use of stricter error conditions or constraints at some portion of a desired "
+        "function.",
+        "7.3.1, L5797-5799",
+        why="there is no measure of *easier*",
+    )
+    yield statement(
+        "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger errors "
+        "are tolerated outside it.",
+        "7.3.1, L5834",
+        why=f"{LOST}. With ours, the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, and on the "
+        f"rest by a factor of {outside:.2f}",
+    )
+    yield statement(
+        "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller motion U "
+        "involved there, may be modified further to give a more favourable dynamic condition.",
+        "7.3.1, L5838",
+        why="there is no measure of *very relaxed* and *more favourable*",
     )
 
 
@@ -432,15 +396,12 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
 
 
 class Motions(NamedTuple):
-    """Figure of slider motions: its claim, the motions, the drawn quantity, and the statements.
-
-    ``see`` is the number of the figure that judges the statements, if they are not given here.
-    """
+    """Figure of slider motions: claim, motions, drawn quantity, statements (or the figure to ``see`` for them), assignment."""
 
     claim: str
     names: tuple[str, ...]
     what: str
-    statements: Callable[[], tuple[Statement, ...]] = tuple
+    statements: Callable[[], Iterable[Statement]] = tuple
     see: str = ""
     assignment: str = SERIES_1
 
@@ -481,7 +442,7 @@ def compute(number: str) -> StudyResult:
         claim=row.claim,
         assignment=row.assignment,
         columns=columns_of_motions(),
-        statements=row.statements(),
+        statements=tuple(row.statements()),
         see=row.see,
     )
 

@@ -9,14 +9,13 @@ part of the ellipse lies beyond. Lengths and errors are in the units of print, c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from itertools import product
 from math import pi, radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ...display import format_count
@@ -37,14 +36,12 @@ from ...synthesis import (
 )
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SEEN_FALL, VERY_CLOSE_DEG
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import FloatArray, Statement, at_least, at_most, near, statement
 from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import TABLE, best
 from .chapter_7 import LIMITS, enclosed_area, reached_area, slider
 from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path, rocker_angle_deg
 from .stated_errors import ROUNDED, errors_by_reading, half_units
-
-FloatArray = NDArray[np.float64]
 
 ROCKER, PATH = "rocker-weighted", "path-b"
 TARGET, FIXED = "0.25", "0.55"
@@ -139,14 +136,6 @@ def readings(name: str) -> list[Linkage]:
     return sorted((one for one in found if np.isfinite(linkage_error(name, one))), key=partial(linkage_error, name))
 
 
-def window_error(linkage: Linkage) -> float:
-    """Return the rms error of the rocker angle (deg) within the weighted window."""
-    p = PROBLEMS[ROCKER]
-    assert isinstance(p.task, RockerFunction)
-    heavy = np.asarray(p.task.weights) == WEIGHT
-    return float(np.degrees(np.sqrt(np.mean(evaluate(p.task, linkage).errors[heavy] ** 2))))
-
-
 def angle_error(linkage: Linkage) -> FloatArray:
     """Return the rocker angle minus the desired angle (deg) at the rotations `TURN`, between -180 and 180."""
     off = np.degrees(linkage.rocker_angle(TURN)) - rocker_angle_deg(TURN)
@@ -155,10 +144,7 @@ def angle_error(linkage: Linkage) -> FloatArray:
 
 @cache
 def error_ratios() -> Mapping[str, float]:
-    """Return the error with two harmonics of the slider divided by that with a fixed pivot, for each problem of chapter VI.
-
-    The linkages are the printed ones.
-    """
+    """Return, for the printed linkages, the error with two harmonics of the slider over that with a fixed pivot."""
     tasks = {
         name: UntimedPath(path=packaging_path()) if name == "packaging" else p.task for name, p in PROBLEMS.items()
     }
@@ -193,17 +179,18 @@ def moved_rocker() -> StudyResult:
         assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
         "are taken.",
         columns=columns,
-        statements=_rocker(),
+        statements=tuple(_rocker()),
     )
 
 
-def _rocker() -> tuple[Statement, ...]:
+def _rocker() -> Iterator[Statement]:
     """Judge the statements on Fig 7.11."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     weights, joined = np.asarray(p.task.weights), readings(ROCKER)
-    angles, heavy = len(weights), np.count_nonzero(weights == WEIGHT)
+    angles, heavy = len(weights), weights == WEIGHT
     best_reading, span = joined[0], error_range(ROCKER, joined[0])
+    in_window = np.degrees(np.sqrt(np.mean(evaluate(p.task, best_reading).errors[heavy] ** 2)))
     fixed = errors_by_reading(ROCKER, p.linkage)
     least_read, reading = min((x, name) for each in joined for name, x in errors_by_reading(ROCKER, each).items())
     raised = linkage_error(ROCKER, best_reading) / linkage_error(ROCKER, p.linkage)
@@ -211,71 +198,63 @@ def _rocker() -> tuple[Statement, ...]:
     two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
     fewer = f"{SEEN_FALL}; an additional freedom cannot raise the least error"
     unknowns = 6  # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
-    return (
-        Statement(
-            "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
-            'direct search method "the simplex" will be considered here.',
-            text("7.3.2, L5915-5919"),
-            "number of equations less that of unknowns: the method takes the error at one crank angle, (7.4), so that (7.6) "
-            f"is an equation for the slider's position at each of the {angles} crank angles that we read at Fig 6.7; the "
-            "unknowns are A0, A1, B1, A2, B2 and v",
-            "one more, with which in general no series meets them all",
-            (at_least("equations less unknowns", 1.0, angles - unknowns),),
+    yield statement(
+        "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
+        'direct search method "the simplex" will be considered here.',
+        "7.3.2, L5915-5919",
+        "number of equations less that of unknowns: the method takes the error at one crank angle, (7.4), so that (7.6) "
+        f"is an equation for the slider's position at each of the {angles} crank angles that we read at Fig 6.7; the "
+        "unknowns are A0, A1, B1, A2, B2 and v",
+        "one more, with which in general no series meets them all",
+        at_least("equations less unknowns", 1.0, angles - unknowns),
+    )
+    yield statement(
+        "All the examples discussed in the previous chapter have been tried and in all cases the errors were reduced.",
+        "7.3.2, L5935; also 6.4.2, L4874, L4969",
+        "error relative to that with the pivot fixed, with the printed links (mended). The slider moves by the printed "
+        "series where there is one (in its best reading, L5965; with l4 and A0 of path (b) mended), and otherwise by "
+        "our best motion of two harmonics, with a stroke of at most a fifth of the longest link (our choice)",
+        fewer,
+        at_most(
+            "weighted rocker function, printed series",
+            1.0 - ALIKE,
+            raised,
+            why="the series printed for the rocker function raises the error",
         ),
-        Statement(
-            "All the examples discussed in the previous chapter have been tried and in all cases the errors were reduced.",
-            text("7.3.2, L5935; also 6.4.2, L4874, L4969"),
-            "error relative to that with the pivot fixed, with the printed links (mended). The slider moves by the printed "
-            "series where there is one (in its best reading, L5965; with l4 and A0 of path (b) mended), and otherwise by "
-            "our best motion of two harmonics, with a stroke of at most a fifth of the longest link (our choice)",
-            fewer,
-            (
-                at_most(
-                    "weighted rocker function, printed series",
-                    1.0 - ALIKE,
-                    raised,
-                    why="the series printed for the rocker function raises the error",
-                ),
-                at_most("path (b), printed series", 1.0 - ALIKE, lowered),
-                *(at_most(NAMES[name], 1.0 - ALIKE, x) for name, x in error_ratios().items() if name not in SERIES),
-            ),
-        ),
-        Statement(
-            "The figure shows that the weighted portion is generated very closely.",
-            text("7.3.2, L5963"),
-            "rms error of the rocker angle within the weighted portion, with the printed series in its best reading, see "
-            "L5965",
-            f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
-            (at_most("printed series", VERY_CLOSE_DEG, window_error(best_reading), "deg"),),
-            "the printed series does not give the stated 4.8 deg2 either, by which the rms error would be at most "
-            f"{sqrt(STATED[ROCKER] / heavy):.2f} deg",
-        ),
-        Statement(
-            "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
-            text("7.3.2, L5965"),
-            f"least error over the readings of the printed series, with the weighted errors at {angles} crank angles added up "
-            "and divided by 1000. The readings differ in its sign, that of its sines and of v; in A0, which is whole, a tenth "
-            "or none; and in the argument, omega t or theta2. Each number of links and series is changed by at most half a "
-            "unit of its last digit, so that the error comes nearest to the stated one",
-            "0.05 deg2, half a unit of the last digit",
-            (near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),),
-            "by the other readings of the angles and weights at Fig 6.7, where the 35.0 is judged, the error is "
-            f"{least_read:.2f} or more; the reading that gives {least_read:.2f} gives {fixed[reading]:.2f} with the pivot "
-            "fixed",
-        ),
-        Statement(
-            "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
-            "equation (7.19) were considered.",
-            text("7.3.2, L5969"),
-            "error with the printed series, as above, relative to that with the pivot fixed. Then the least error with "
-            "three harmonics relative to that with two, with the slider at most l1 from the printed pivot (our choice)",
-            f"0.15 for *enormous*, our choice, since 4.8 over 35.0 is 0.14; {fewer}",
-            (
-                at_most("printed series", 0.15, raised, why="the printed series does not give the stated 4.8"),
-                at_most("three harmonics", 1.0 - ALIKE, three / two),
-            ),
-            "there is no equation (7.19); more terms of (7.18) are meant",
-        ),
+        at_most("path (b), printed series", 1.0 - ALIKE, lowered),
+        *(at_most(NAMES[name], 1.0 - ALIKE, x) for name, x in error_ratios().items() if name not in SERIES),
+    )
+    yield statement(
+        "The figure shows that the weighted portion is generated very closely.",
+        "7.3.2, L5963",
+        "rms error of the rocker angle within the weighted portion, with the printed series in its best reading, see L5965",
+        f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+        at_most("printed series", VERY_CLOSE_DEG, in_window, "deg"),
+        why="the printed series does not give the stated 4.8 deg2 either, by which the rms error would be at most "
+        f"{sqrt(STATED[ROCKER] / np.count_nonzero(heavy)):.2f} deg",
+    )
+    yield statement(
+        "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
+        "7.3.2, L5965",
+        f"least error over the readings of the printed series, with the weighted errors at {angles} crank angles added up "
+        "and divided by 1000. The readings differ in its sign, that of its sines and of v; in A0, which is whole, a tenth "
+        "or none; and in the argument, omega t or theta2. Each number of links and series is changed by at most half a "
+        "unit of its last digit, so that the error comes nearest to the stated one",
+        "0.05 deg2, half a unit of the last digit",
+        near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),
+        why="by the other readings of the angles and weights at Fig 6.7, where the 35.0 is judged, the error is "
+        f"{least_read:.2f} or more; the reading that gives {least_read:.2f} gives {fixed[reading]:.2f} with the pivot fixed",
+    )
+    yield statement(
+        "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
+        "equation (7.19) were considered.",
+        "7.3.2, L5969",
+        "error with the printed series, as above, relative to that with the pivot fixed. Then the least error with "
+        "three harmonics relative to that with two, with the slider at most l1 from the printed pivot (our choice)",
+        f"0.15 for *enormous*, our choice, since 4.8 over 35.0 is 0.14; {fewer}",
+        at_most("printed series", 0.15, raised, why="the printed series does not give the stated 4.8"),
+        at_most("three harmonics", 1.0 - ALIKE, three / two),
+        why="there is no equation (7.19); more terms of (7.18) are meant",
     )
 
 
@@ -315,10 +294,7 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def out_of_reach(quarter: int = 20000) -> float:
-    """Return the area (cm2) of the ellipse's part that lies beyond l2 + r from the crank shaft.
-
-    Ellipse and circle of this radius are approximated by polygons with ``quarter`` sides in each quadrant.
-    """
+    """Return the ellipse's area (cm2) beyond l2 + r from the crank shaft, by polygons with ``quarter`` sides a quadrant."""
     from shapely import Point, Polygon
 
     p = PROBLEMS[PATH]
@@ -339,10 +315,7 @@ def shares_of_stated() -> dict[str, float]:
 
 
 def error_range(name: str, found: Linkage) -> tuple[float, float]:
-    """Return the least and the greatest error with a printed series over the rounding of the printed numbers.
-
-    ``found`` is the linkage with this series.
-    """
+    """Return least and greatest error of the linkage ``found`` with a printed series over the rounding of its numbers."""
     motion, (mean, guide) = slider(found), HALF_UNITS[name]
     off = np.concatenate(
         [half_units(found), np.array([mean, *[0.0005] * 4]) / CM_PER_METRE, [radians(guide)]], dtype=float
@@ -389,61 +362,50 @@ def moved_path() -> StudyResult:
     return StudyResult(
         claim="The slider, moved by two harmonics, reduces the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=pad_columns(columns),
-        statements=_path(),
+        statements=tuple(_path()),
     )
 
 
-def _path() -> tuple[Statement, ...]:
+def _path() -> Iterator[Statement]:
     """Judge the statements on Fig 7.12."""
     to_the_letter = replace(printed_linkage(PATH), rocker_length=PROBLEMS[PATH].printed.rocker_length)
     span = error_range(PATH, mended_path_linkage())
-    return (
-        Statement(
-            "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
-            text("7.3.2, L5994"),
-            "area with the printed series: as printed; then with l4 = 184.443 cm, as in Fig 6.10, and A0 = 0.31 cm, "
-            f"{ROUNDED}, also those of series and guide",
-            "0.05 cm2, half a unit of the last digit",
-            (
-                near(
-                    "as printed",
-                    "4.3",
-                    linkage_error(PATH, to_the_letter),
-                    unit="cm2",
-                    why="l4 = 183.443 and A0 = 3.1 are read as misprints",
-                ),
-                near(
-                    f"mended; rounded {min(span):.2f} to {max(span):.2f}", "4.3", float(np.clip(4.3, *span)), unit="cm2"
-                ),
-            ),
-            "the 12.6 cm2 are judged at L5051, Fig 6.9",
+    yield statement(
+        "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
+        "7.3.2, L5994",
+        "area with the printed series: as printed; then with l4 = 184.443 cm, as in Fig 6.10, and A0 = 0.31 cm, "
+        f"{ROUNDED}, also those of series and guide",
+        "0.05 cm2, half a unit of the last digit",
+        near(
+            "as printed",
+            "4.3",
+            linkage_error(PATH, to_the_letter),
+            unit="cm2",
+            why="l4 = 183.443 and A0 = 3.1 are read as misprints",
         ),
-        Statement(
-            "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
-            "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
-            "suitable control of U than could otherwise be obtained.",
-            text("7.0, L5248"),
-            "area that P reaches relative to that within the envelope, for the three limits of U of L5242, Fig 7.2 (our "
-            "choice). Then the area between path and curve with two harmonics of the slider, found as at L5935, relative to "
-            "that with the pivot fixed: we read *otherwise* as with the same links",
-            f"1 %, as at Fig 7.2; {SEEN_FALL}",
-            (
-                *(
-                    near(
-                        f"anywhere within, U from {low:g} to {high:g}",
-                        1.0,
-                        reached_area(low, high).area / enclosed_area(low, high),
-                        0.01,
-                        why="the envelope has a hole, see Fig 7.2",
-                    )
-                    for low, high in LIMITS
-                ),
-                *(
-                    at_most(NAMES[name], 1.0 - ALIKE, error_ratios()[name])
-                    for name in ("path-a", "path-b", "packaging")
-                ),
-            ),
+        near(f"mended; rounded {min(span):.2f} to {max(span):.2f}", "4.3", float(np.clip(4.3, *span)), unit="cm2"),
+        why="the 12.6 cm2 are judged at L5051, Fig 6.9",
+    )
+    yield statement(
+        "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
+        "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
+        "suitable control of U than could otherwise be obtained.",
+        "7.0, L5248",
+        "area that P reaches relative to that within the envelope, for the three limits of U of L5242, Fig 7.2 (our "
+        "choice). Then the area between path and curve with two harmonics of the slider, found as at L5935, relative to "
+        "that with the pivot fixed: we read *otherwise* as with the same links",
+        f"1 %, as at Fig 7.2; {SEEN_FALL}",
+        *(
+            near(
+                f"anywhere within, U from {low:g} to {high:g}",
+                1.0,
+                reached_area(low, high).area / enclosed_area(low, high),
+                0.01,
+                why="the envelope has a hole, see Fig 7.2",
+            )
+            for low, high in LIMITS
         ),
+        *(at_most(NAMES[name], 1.0 - ALIKE, error_ratios()[name]) for name in ("path-a", "path-b", "packaging")),
     )
 
 

@@ -7,15 +7,13 @@ from itertools import product
 from math import radians
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
 from ...synthesis import Linkage, RockerFunction, UntimedPath, evaluate
 from ...units import CM_PER_METRE
-from ..statements import Case, near
+from ..statements import Case, FloatArray, near
 from .problems import DEG2_PER_RAD2, PROBLEMS, WEIGHT, rocker_function
-
-FloatArray = NDArray[np.float64]
 
 #: How a printed linkage is rounded before its error is judged.
 ROUNDED = (
@@ -41,10 +39,7 @@ def share_of_stated(name: str) -> float:
 
 
 def errors_by_reading(name: str, linkage: Linkage) -> dict[str, float]:
-    """Return the error of a linkage (unit of print) for each reading of the text.
-
-    Only the rocker functions have more than one reading.
-    """
+    """Return a linkage's error (unit of print) by each reading of the text; only rocker functions have several."""
     if not isinstance(PROBLEMS[name].task, RockerFunction):
         return {"": PROBLEMS[name].linkage_error(linkage)}
     found: dict[str, float] = {}
@@ -75,10 +70,7 @@ def half_units(linkage: Linkage) -> FloatArray:
 
 
 def rounding_range(name: str) -> tuple[str, float, float]:
-    """Return the reading that comes nearest to the stated error, and the least and the greatest error that it allows.
-
-    The readings are those of `errors_by_reading`. Each printed dimension may be off by up to half a unit of its last digit.
-    """
+    """Return the reading nearest to the stated error, and the least and greatest error that the digits' rounding allows."""
     p = PROBLEMS[name]
     assert p.error is not None
     off, stated = half_units(p.linkage), p.error
