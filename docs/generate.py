@@ -16,6 +16,8 @@ import json
 import re
 import sys
 from collections.abc import Callable, Container, Iterator
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -143,18 +145,10 @@ def race(of: str, page: str) -> str:
     return markdown(read(HERE / "race.csv"), of)
 
 
-def crossing(of: str, page: str) -> str:
-    """Return the table of docs/crossing.csv."""
-    from benchmarks.crossing import markdown, read
-
-    return markdown(read(HERE / "crossing.csv"))
-
-
-def masters(of: str, page: str) -> str:
-    """Return the table of docs/masters.csv."""
-    from benchmarks.masters import markdown, read
-
-    return markdown(read(HERE / "masters.csv"))
+def stored(name: str, of: str, page: str) -> str:
+    """Return the table of the file docs/NAME.csv of a benchmark."""
+    benchmark = import_module(f"benchmarks.{name}")
+    return str(benchmark.markdown(benchmark.read(HERE / f"{name}.csv")))
 
 
 def commanded(of: str, page: str) -> str:
@@ -178,7 +172,7 @@ CHAPTERS = (*"345678", "R", "ours")
 #: Functions that make a table from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "rule": rule, "probe": probe, "race": race,
-    "crossing": crossing, "accuracy": accuracy, "masters": masters, "commanded": commanded,
+    "crossing": partial(stored, "crossing"), "accuracy": accuracy, "masters": partial(stored, "masters"), "commanded": commanded,
 }  # fmt: skip
 
 
@@ -371,18 +365,14 @@ def main(arguments: list[str]) -> int:
             for name, figure, dpi in pictures():
                 save_picture(figure, HERE / f"{name}.png", dpi)
     stale = []
-    for path in PAGES:
-        text = path.read_text(encoding="utf-8")
-        new = filled(text, chapters=chapters)
+    # the statements are listed last, from the pages
+    for path in (*PAGES, SENTENCES):
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        new = sentences() if path == SENTENCES else filled(text, chapters=chapters)
         if new != text:
             stale.append(path.name)
             if "--check" not in arguments:
                 path.write_text(new, encoding="utf-8")
-    listed = sentences()
-    if not SENTENCES.exists() or SENTENCES.read_text(encoding="utf-8") != listed:
-        stale.append(SENTENCES.name)
-        if "--check" not in arguments:
-            SENTENCES.write_text(listed, encoding="utf-8")
     if stale and "--check" in arguments:
         sys.exit(f"out of date, run python docs/generate.py: {', '.join(stale)}")
     return 0

@@ -182,15 +182,12 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
     parts = np.array_split(np.arange(len(values)), min(_BANDS, _oscillations(values) // 2))
     middle = np.array([time[part].mean() for part in parts])
     ends = np.array([(values[part].min(), values[part].max()) for part in parts])
-    (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
+    # weighted means hardly depend on the phase at which an oscillation is cut off
+    means = [np.average(values[part], weights=np.hanning(len(part) + 2)[1:-1]) for part in parts]
+    (drawn,) = axis.plot(middle, means, line, label=label or None)
     colour = drawn.get_color()
     # edges tell overlapping bands apart
     axis.fill_between(middle, *ends.T, facecolor=(colour, 0.15), edgecolor=(colour, 0.6), linewidth=style.HAIR)
-
-
-def _smooth_mean(values: FloatArray) -> float:
-    """Return a weighted mean of values that hardly depends on the phase at which an oscillation is cut off."""
-    return float(np.average(values, weights=np.hanning(len(values) + 2)[1:-1]))
 
 
 def is_fast(values: FloatArray) -> bool:

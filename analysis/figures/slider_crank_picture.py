@@ -102,9 +102,10 @@ class _Part:
         return np.array([pose.angle for pose in self.poses])
 
     @property
-    def marks(self) -> tuple[tuple[Sequence[_Pose], str, str, str], ...]:
-        """Return the marked poses, dead centres and limits of assembly, as (poses, name, colour, marker)."""
-        return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
+    def marks(self) -> list[tuple[_Pose, str, str, str]]:
+        """Return the marked poses, dead centres and limits of assembly, as (pose, name, colour, marker)."""
+        dead = [(pose, "dead centre", _DEAD, "D") for pose in self.dead]
+        return dead + [(pose, "limit", _LIMIT, "s") for pose in self.limits]
 
 
 def _parts(parameters: SliderCrankParameters, law: PeriodicShift, factor: float) -> list[_Part]:
@@ -247,14 +248,13 @@ class _Scene:
         for part in self.parts:
             self._line(axis, part.crank_pins, color=style.TRACE, linewidth=style.BOLD, zorder=2)
             self._line(axis, part.slider_pins, color=style.TRACE, linewidth=3.0, zorder=2)
-            for places, _, colour, marker in part.marks:
-                for place in places:
-                    if letters:
-                        joints = [place.centre, place.crank_pin, place.slider_pin]
-                        self._line(axis, joints, color=colour, linewidth=style.THIN, linestyle="--", zorder=2)
-                    pins = self.page([place.crank_pin, place.slider_pin])
-                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": style.HAIR}
-                    axis.plot(*pins.T, marker, color=colour, markersize=style.DOT, zorder=6, **edge)
+            for place, _, colour, marker in part.marks:
+                if letters:
+                    joints = [place.centre, place.crank_pin, place.slider_pin]
+                    self._line(axis, joints, color=colour, linewidth=style.THIN, linestyle="--", zorder=2)
+                pins = self.page([place.crank_pin, place.slider_pin])
+                edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": style.HAIR}
+                axis.plot(*pins.T, marker, color=colour, markersize=style.DOT, zorder=6, **edge)
 
     def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         u = self.size
@@ -307,10 +307,9 @@ class _Scene:
             _Label(self.foot, rf"$\alpha_4$ = {degrees(self.parameters.guide_twist):.4g}°", _TWIST),
         ]
         for part in self.parts:
-            for places, name, colour, _ in part.marks:
-                for place in places:
-                    text = f"{name} {degrees(place.angle) % 360.0:.2f}°"
-                    labels += [_Label(pin, text, colour, small) for pin in (place.slider_pin, place.crank_pin)]
+            for place, name, colour, _ in part.marks:
+                text = f"{name} {degrees(place.angle) % 360.0:.2f}°"
+                labels += [_Label(pin, text, colour, small) for pin in (place.slider_pin, place.crank_pin)]
         x, y = self.page([label.point for label in labels]).T
         x_covered, y_covered = self.covered.T
         colours = [label.colour for label in labels]
@@ -470,12 +469,11 @@ def _plot_slider_position(axis: Axes, parts: Sequence[_Part], unit: str) -> None
     """Plot the slider position over the crank angle, and mark dead centres and limits of assembly."""
     for part in parts:
         axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=style.COLOURS[0], zorder=3)
-        for places, _, colour, marker in part.marks:
-            for place in places:
-                low, turn = degrees(part.angles[0]), degrees(place.angle)
-                # a range may begin before zero and reach beyond a turn
-                shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
-                axis.plot(shown, place.slide, marker, color=colour, markersize=style.DOT, zorder=6)
+        for place, _, colour, marker in part.marks:
+            low, turn = degrees(part.angles[0]), degrees(place.angle)
+            # a range may begin before zero and reach beyond a turn
+            shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
+            axis.plot(shown, place.slide, marker, color=colour, markersize=style.DOT, zorder=6)
     axis.set_xlabel("crank angle [deg]")
     axis.set_ylabel(f"slider position [{unit}]")
 
@@ -540,16 +538,15 @@ def _draw_circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -
     axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=style.LINE)
     for part in parts:
         axis.plot(*part.crank_pins[:, :2].T, color=style.TRACE, linewidth=3.5)
-        for places, name, colour, marker in part.marks:
-            for place in places:
-                x, y = place.crank_pin[:2]
-                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=style.THIN)
-                axis.plot(x, y, marker, color=colour, markersize=style.DOT, zorder=5)
-                side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
-                out = 10.0 * x / radius, 18.0 * y / radius
-                text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
-                look: dict[str, Any] = {"color": colour, "fontsize": style.TINY, "ha": side, "va": "center"}
-                axis.annotate(text, (x, y), out, textcoords="offset points", **look)
+        for place, name, colour, marker in part.marks:
+            x, y = place.crank_pin[:2]
+            axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=style.THIN)
+            axis.plot(x, y, marker, color=colour, markersize=style.DOT, zorder=5)
+            side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
+            out = 10.0 * x / radius, 18.0 * y / radius
+            text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
+            look: dict[str, Any] = {"color": colour, "fontsize": style.TINY, "ha": side, "va": "center"}
+            axis.annotate(text, (x, y), out, textcoords="offset points", **look)
     axis.plot(0.0, 0.0, "o", color=style.CRANK, markersize=style.DOT)
     axis.set_aspect("equal")
     axis.set_xlim(-1.75 * radius, 1.75 * radius)

@@ -55,7 +55,8 @@ def draw_link(axis: Axes, points: Sequence[Array], colour: str, *, zorder: float
     first, second, *_ = points
     bar: dict[str, Any] = {"color": colour, "linewidth": wide, "solid_capstyle": "round"}
     if len(points) > 2:
-        corners = _sort_by_angle(points)
+        spread = np.array(points) - np.mean(points, axis=0)
+        corners = np.array(points)[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))]
         along = (second - first) / max(hypot(*(second - first)), 1e-300)
         heights = [abs(float(along[0] * (q - first)[1] - along[1] * (q - first)[0])) for q in points]
         if max(heights) > _FLAT * hypot(*(second - first)):
@@ -65,13 +66,6 @@ def draw_link(axis: Axes, points: Sequence[Array], colour: str, *, zorder: float
         else:
             draw_line(axis, sorted(points, key=lambda q: float((q - first) @ along)), **bar, zorder=zorder)
     draw_line(axis, [first, second], **bar, zorder=zorder + 1.0)
-
-
-def _sort_by_angle(points: Sequence[Array]) -> Array:
-    """Return points sorted by their angles about their mean."""
-    array = np.array(points)
-    spread = array - array.mean(axis=0)
-    return array[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))]
 
 
 def draw_pin(axis: Axes, place: Array, unit: float, colour: str = "white", *, zorder: float = 9.0) -> None:

@@ -184,10 +184,7 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return half the range of values of each of m Fourier series, shape (m,).
-
-    The series are given by their cosine and sine coefficients, each of shape (m, n + 1).
-    """
+    """Return half the range of m Fourier series, shape (m,), given their cosine and sine coefficients, each (m, n + 1)."""
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
     phase = np.multiply.outer(n, angle)
@@ -477,6 +474,5 @@ def _newton(
             )
     raise HarmonicBalanceError(
         f"the balance of order {order} at {speed:.6g} rad/s does not converge: residual "
-        f"{np.abs(unbalanced).max() / scale:.1e}, step {size:.1e} m after {iteration} iterations, "
-        f"mean position {x[0]:.6g} m"
+        f"{np.abs(unbalanced).max() / scale:.1e}, step {size:.1e} m after {iteration} iterations, mean position {x[0]:.6g} m"
     )
