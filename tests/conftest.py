@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from hypothesis import settings
 
-from analysis import cli
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.mechanisms import MECHANISMS
 from analysis.numerics.codegen import Kernel
 from benchmarks.studio import chromium
 from build_fmu import FMUS
 
+from . import scripts
 from .mechanisms import pendulum, rotor_on_cart
 
 if TYPE_CHECKING:
@@ -171,10 +171,6 @@ def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
 
 @pytest.fixture
 def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """Return a function that calls the command line with the given words, in a folder of its own."""
+    """Return a function that calls the command line, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-
-    def call(*words: object) -> Result:
-        return CliRunner().invoke(cli.main, [str(word) for word in words], catch_exceptions=False)
-
-    return call
+    return scripts.linkwork

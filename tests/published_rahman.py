@@ -7,7 +7,6 @@ seconds and degrees, as printed; the factors to SI are at the top. Nothing here 
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 # One unit in SI
@@ -50,17 +49,20 @@ SPOTS = (
     Spot(20.0, 0.0, 310.0, 44.111244, 62.432803, 36.61340, -8.206263, 2.15027),
 )
 #: Dead centres at S1 = 0 and 270 deg, by the offset in inches.
-DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = MappingProxyType(
-    {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
-)
+DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = {
+    10.0: (99.28, 285.26),
+    20.0: (108.82, 301.76),
+    30.0: (118.94, 322.14),
+}
 #: Strokes (in) at S1 = 0 and 270 deg, by the offset in inches.
-STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935})
+STROKES_IN: Mapping[float, float] = {0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935}
 #: Strokes at a4 = 20 in and S1 = 0, by the twist in degrees.
-STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
+STROKES_BY_TWIST_IN: Mapping[float, float] = {232.0: 21.85, 310.0: 21.39}
 #: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
-GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
+GREATEST_SHIFTS_IN: Mapping[float, float] = {0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129}
 #: Greatest magnitude of the force 2F2k and half a unit of its last digit (lb), by a4, S1 (in) and alpha4 (deg). We take it as
 #: the greatest magnitude more than 10 deg away from a dead centre, since the force is unbounded at a dead centre.
-AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
-    {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
-)
+AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = {
+    (10.0, 3.5, 270.0): (4.1, 0.05),
+    (20.0, 0.0, 310.0): (27.0, 0.5),
+}

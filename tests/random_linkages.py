@@ -90,20 +90,22 @@ class Maker:
             self.pinned.append((body, base))
         if kind == "R" and base == "ground":
             self.mates.append((body, self.place_of("ground", joint)))
-        self.data["freedoms"][self.name("f")] = {
-            "joint": joint,
-            "start": float(start),
-            "driven": bool(self.rng.uniform() < 0.6),
-        }
+        self.free(joint, start, bool(self.rng.uniform() < 0.6))
+
+    def free(self, joint: str, start: float, driven: bool) -> None:
+        self.data["freedoms"][self.name("f")] = {"joint": joint, "start": float(start), "driven": driven}
 
     def position(self, slide: str) -> float:
         """Return the position of a slide (m) at the places of its bodies."""
         s = self.data["slides"][slide]
-        x, y, angle = self.places[s["on"]]
-        ox, oy = self.place_of(s["on"], s["through"])
-        ox, oy = x + np.cos(angle) * ox - np.sin(angle) * oy, y + np.sin(angle) * ox + np.cos(angle) * oy
+        ox, oy = self.in_ground(s["on"], s["through"])
         bx, by, turn = self.places[s["body"]]
         return float((bx - ox) * np.cos(turn) + (by - oy) * np.sin(turn))
+
+    def in_ground(self, body: str, own: str) -> np.ndarray:
+        x, y, angle = self.places[body]
+        p, c, s = self.place_of(body, own), np.cos(angle), np.sin(angle)
+        return np.array([x + c * p[0] - s * p[1], y + s * p[0] + c * p[1]])
 
     def place_of(self, body: str, own: str) -> np.ndarray:
         points = self.data["ground"] if body == "ground" else self.data["bodies"][body]["points"]
@@ -122,21 +124,14 @@ class Maker:
             holder, pinned = (body, other) if self.rng.uniform() < 0.5 else (other, body)
             self.mark(pinned, own, at)
             self.mark(holder, through, self.spot())
-            x, y, angle = self.places[holder]
-            p = self.place_of(holder, through)
-            start = np.array(
-                [x + np.cos(angle) * p[0] - np.sin(angle) * p[1], y + np.sin(angle) * p[0] + np.cos(angle) * p[1]]
-            )
-            direction = np.arctan2(at[1] - start[1], at[0] - start[0]) - angle
+            way = at - self.in_ground(holder, through)
+            direction = np.arctan2(way[1], way[0]) - self.places[holder][2]
             self.data["slots"][name] = {"pin": own, "on": holder, "through": through, "direction": float(direction)}
             return None
         first, second = self.known(), self.known()
         one, other = self.new(), self.new()
-        outer = [kind[0], kind[2]]
-        if kind == "RPP":
-            outer = ["R", "P"]
-        self.joined(outer[0], first, one)
-        self.joined(outer[1], second, other)
+        self.joined(kind[0], first, one)
+        self.joined(kind[2], second, other)
         if kind[1] == "R":
             self.pin(one, other)
         else:
@@ -154,11 +149,7 @@ class Maker:
         first, upper, lower, coupler, lever = (self.new() for _ in range(5))
         self.pin(base, first)
         start = self.places[upper][2] - self.places[first][2]
-        self.data["freedoms"][self.name("f")] = {
-            "joint": self.pin(first, upper),
-            "start": float(start),
-            "driven": False,
-        }
+        self.free(self.pin(first, upper), start, driven=False)
         for pair in ((first, lower), (lower, coupler), (upper, coupler), (coupler, lever), (other, lever)):
             self.pin(*pair)
 
@@ -198,19 +189,17 @@ class Maker:
         owned = [(body, own) for body, table in data["bodies"].items() for own in table["points"]]
         for freedom in data["freedoms"].values():
             if rng.uniform() < 0.5:
-                data["springs"][self.name("k")] = {
-                    "at": freedom["joint"], "stiffness": 30.0, "damping": 0.3, "free": float(freedom["start"] + 0.1),
-                }  # fmt: skip
+                joint, free = freedom["joint"], float(freedom["start"] + 0.1)
+                data["springs"][self.name("k")] = {"at": joint, "stiffness": 30.0, "damping": 0.3, "free": free}
         if data["slides"] and rng.uniform() < 0.5:
             joint = str(rng.choice(list(data["slides"])))
             data["springs"][self.name("k")] = {"at": joint, "stiffness": 40.0, "damping": 0.2, "free": 0.03}
         ends = {own for _, own in owned}
         if len(ends) > 1:
-            pair = rng.choice(sorted(ends), 2, replace=False)
+            pair = [str(own) for own in rng.choice(sorted(ends), 2, replace=False)]
             name, tables = self.name("k"), [data["ground"], *(body["points"] for body in data["bodies"].values())]
             if not any(set(pair) <= table.keys() for table in tables):
-                ends_of = [str(own) for own in pair]
-                data["springs"][name] = {"between": ends_of, "stiffness": 50.0, "damping": 0.5, "free": 0.2}
+                data["springs"][name] = {"between": pair, "stiffness": 50.0, "damping": 0.5, "free": 0.2}
         if not owned:
             body = next(iter(data["bodies"]))
             owned = [(body, self.pin(body))]

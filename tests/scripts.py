@@ -1,10 +1,15 @@
-"""Run programs, and load the scripts of docs/, which is not a package, as modules."""
+"""Run the command line and other programs, and load the scripts of docs/, which is not a package, as modules."""
 
 import importlib.util
+import shlex
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
+
+from click.testing import CliRunner, Result
+
+from analysis import cli
 
 
 def called(
@@ -15,6 +20,13 @@ def called(
     done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, timeout=timeout, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def linkwork(typed: str, *words: object, code: int = 0) -> Result:
+    """Call the command line, which must exit with ``code``: words as they are typed, and more of them, one each."""
+    done = CliRunner().invoke(cli.main, [*shlex.split(typed), *map(str, words)], catch_exceptions=False)
+    assert done.exit_code == code, done.output
+    return done
 
 
 def script_of_docs(name: str) -> ModuleType:

@@ -52,17 +52,8 @@ class Case(NamedTuple):
 
     def inputs(self, drive: str) -> dynamics.Inputs:
         """Return the inputs under one of `DRIVES`; inputs that the drive should not read have values too, see `read`."""
-        speed_drive, shift_drive, groove = DRIVES[drive]
-        return dynamics.Inputs(
-            speed_drive,
-            shift_drive,
-            groove,
-            self.torque,
-            self.acceleration,
-            self.force,
-            self.shift_acceleration,
-            self.load,
-        )
+        acting = (self.torque, self.acceleration, self.force, self.shift_acceleration, self.load)
+        return dynamics.Inputs(*DRIVES[drive], *acting)
 
     def read(self, drive: str) -> dynamics.Inputs:
         """Return the inputs as the plant should read them under a drive: inputs that belong to other drives are zero."""
@@ -124,15 +115,9 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
         groove_ratio=ratio, gravity_x=either(0.5, 20.0), gravity_y=either(0.5, 20.0), gravity_z=either(0.5, 20.0),
         assembly_branch=1 if choose() else -1,
     )  # fmt: skip
-    return Case(
-        parameters,
-        (th, s1, either(0.5, 30.0), either(0.05, 2.0), 0.0, 0.0),
-        either(0.1, 20.0),
-        either(1.0, 500.0),
-        either(0.1, 50.0),
-        either(0.1, 50.0),
-        either(0.1, 50.0),
-    )
+    state = (th, s1, either(0.5, 30.0), either(0.05, 2.0), 0.0, 0.0)
+    acting = (either(low, high) for low, high in ((0.1, 20.0), (1.0, 500.0), *3 * [(0.1, 50.0)]))
+    return Case(parameters, state, *acting)
 
 
 seeded, cases, mechanisms = suppliers(draw)

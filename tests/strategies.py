@@ -8,6 +8,7 @@ freedoms, then the transmission angle, then the lengths of coupler and rocker th
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import asin, cos, hypot, pi, sin, sqrt
 from typing import Any, NamedTuple, TypeVar
 
@@ -115,9 +116,8 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
 @st.composite
 def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
     """Return a hypothesis strategy of the cases that ``draw`` makes."""
-    return draw(
-        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)), lambda: draw_from(st.booleans())
-    )
+    numbers = partial(st.floats, allow_subnormal=False)
+    return draw(lambda low, high: draw_from(numbers(low, high)), lambda: draw_from(st.booleans()))
 
 
 def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.SearchStrategy[T]], Callable[[], Any]]:
@@ -130,10 +130,7 @@ def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.Search
         source = random.Random(seed)
         return draw(source.uniform, lambda: source.random() < 0.5)
 
-    def cases() -> st.SearchStrategy[T]:
-        return drawn(draw)
-
-    return seeded, cases, lambda: cases().map(lambda case: case.parameters)
+    return seeded, lambda: drawn(draw), lambda: drawn(draw).map(lambda case: case.parameters)
 
 
 seeded, cases, mechanisms = suppliers(draw)

@@ -1,16 +1,18 @@
-"""Fixtures of the analysis tests, and a reader of the CSV files that commands write."""
+"""Fixtures of the analysis tests, and readers of the tables that commands print and of the CSV files that they write."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
 from analysis.files import write_text
 from analysis.mechanisms import register
+from analysis.run import Case, Trajectory, simulate
 from analysis.studio import PAGE, make_page
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
@@ -29,6 +31,15 @@ def registered() -> None:
     """Register the mechanisms of the tests for a module."""
     for module in (pendulum, rotor_on_cart, torsion):
         register(module.MECHANISM)
+
+
+def copied(fmu: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
+    """Copy an FMU with ``change(name, content)`` for the content of each member; None leaves the member out."""
+    with ZipFile(fmu) as archive, ZipFile(target, "w") as copy:
+        for name in archive.namelist():
+            if (content := change(name, archive.read(name))) is not None:
+                copy.writestr(name, content)
+    return target
 
 
 def opened(browser: Browser, path: Path, **options: Any) -> Page:
@@ -68,16 +79,9 @@ def open_page(browser: Browser, tmp_path: Path) -> Iterator[Callable[..., Page]]
 @pytest.fixture
 def phone(browser: Browser) -> Iterator[Any]:
     """Return the studio's page on a phone, paused, and `touch(kind, points)`, which touches it with one or two fingers."""
-    context = browser.new_context(
-        viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2
-    )
-    made = context.new_page()
-    made.set_default_timeout(600_000)
-    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
-    made.goto(PAGE.as_uri())
-    made.wait_for_function("document.documentElement.dataset.ready")
-    made.tap("#play")
-    line = context.new_cdp_session(made)
+    screen = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
+    made = opened(browser, PAGE, has_touch=True, is_mobile=True, **screen)
+    line = made.context.new_cdp_session(made)
 
     def touch(kind: str, *points: tuple[float, float]) -> None:
         fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
@@ -86,7 +90,25 @@ def phone(browser: Browser) -> Iterator[Any]:
         made.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
 
     yield made, touch
-    context.close()
+    made.close()
+
+
+def marked(mark: str, values: Iterable[Any]) -> Iterator[Any]:
+    """Mark the values of a parametrized test, "slow" or "long"; a tuple is of several parameters."""
+    for value in values:
+        yield pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=getattr(pytest.mark, mark))
+
+
+def run_case(case: Case, **options: Any) -> Trajectory:
+    """Run a case in process, with options of `simulate` in the place of its own."""
+    own = {"initial": case.initial, "stop_time": case.stop_time, "step": case.step}
+    return simulate(case.parameters, case.inputs, **own | options)
+
+
+def cells(output: str) -> dict[str, list[str]]:
+    """Return the cells of the rows of printed tables, by the first one."""
+    lines = ([cell.strip() for cell in line.strip("│").split("│")] for line in output.splitlines() if "│" in line)
+    return {first: rest for first, *rest in lines}
 
 
 def csv(path: Path) -> dict[str, np.ndarray]:

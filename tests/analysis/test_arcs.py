@@ -20,12 +20,16 @@ def resonant(width: float = 1.5) -> np.ndarray:
 
 def found(*branches: Branch) -> dict[Risk, list[tuple[float, float]]]:
     """The ranges to avoid by their reasons."""
-    ranges = response(*branches).speeds_to_avoid
-    return {
-        risk: [(a.low, a.high) for a in ranges if a.risk is risk]
-        for risk in Risk
-        if any(a.risk is risk for a in ranges)
-    }
+    ranges: dict[Risk, list[tuple[float, float]]] = {}
+    for avoided in response(*branches).speeds_to_avoid:
+        ranges.setdefault(avoided.risk, []).append((avoided.low, avoided.high))
+    return ranges
+
+
+def single(low: float, high: float) -> Branch:
+    """A motion of amplitude 1 that is unstable between two period doublings."""
+    doublings = [(Crossing.PERIOD_DOUBLING, at, 1.0, int((at > X).sum()) - 1) for at in (low, high)]
+    return branch(X, np.ones(len(X)), np.where((low < X) & (high > X), 1.2, 0.9), doublings)
 
 
 def test_half_power_band_of_a_resonance() -> None:
@@ -90,31 +94,22 @@ def test_a_resonance_without_damping(greatest: float) -> None:
 
 
 def test_doubled_motions_and_none() -> None:
-    unstable = (X > 98.0) & (X < 102.0)
-    doublings = [
-        (Crossing.PERIOD_DOUBLING, 98.0, 1.0, int((X <= 98.0).sum()) - 1),
-        (Crossing.PERIOD_DOUBLING, 102.0, 1.0, int((X < 102.0).sum()) - 1),
-    ]
-    single = branch(X, np.ones(len(X)), np.where(unstable, 1.2, 0.9), doublings)
+    simple = single(98.0, 102.0)
     x = np.linspace(98.0, 101.0, 50)
     # the doubled branch turns back on itself where it begins: that is no fold at which a motion ends
     doubled = branch(x, np.sqrt(1.0 + x - 98.0), 0.9, [(Crossing.FOLD, 98.0, 1.0, 0)], turns=2)
-    ranges = found(single, doubled)
+    ranges = found(simple, doubled)
     assert ranges[Risk.DOUBLED] == [pytest.approx((98.0, 101.0))]
     assert ranges[Risk.UNSTABLE] == [pytest.approx((101.0, 102.0))]
-    assert not fold_jumps([single, doubled])
+    assert not fold_jumps([simple, doubled])
     beside = branch(np.linspace(102.5, 104.0, 50), np.full(50, 3.0), 0.9, turns=2)
-    assert found(single, doubled, beside)[Risk.SEVERAL] == [pytest.approx((102.5, 104.0))]
+    assert found(simple, doubled, beside)[Risk.SEVERAL] == [pytest.approx((102.5, 104.0))]
 
 
 def test_a_doubled_motion_is_stable_from_its_doubling_on() -> None:
     """Its branch is followed from a step beyond the doubling on, and to a step before the other one."""
-    doublings = [
-        (Crossing.PERIOD_DOUBLING, value, 1.0, int((value > X).sum()) - 1) for value in (98.0 + 1e-9, 102.0 - 1e-9)
-    ]
-    single = branch(X, np.ones(len(X)), np.where((X > 98.0) & (X < 102.0), 1.2, 0.9), doublings)
     doubled = branch(np.linspace(98.01, 101.99, 50), np.full(50, 1.01), 0.9, turns=2)
-    ranges = found(single, doubled)
+    ranges = found(single(98.0 + 1e-9, 102.0 - 1e-9), doubled)
     assert ranges[Risk.DOUBLED] == [(98.0 + 1e-9, 102.0 - 1e-9)]
     assert Risk.UNSTABLE not in ranges
 
@@ -123,9 +118,9 @@ def test_a_stable_stretch_between_two_unstable_ones_is_not_avoided() -> None:
     gaps = ((92.0, 95.0), (103.0, 106.0))
     multiplier = np.where(np.any([(low < X) & (high > X) for low, high in gaps], axis=0), 1.2, 0.9)
     doublings = [(Crossing.PERIOD_DOUBLING, at, 1.0, int((at > X).sum()) - 1) for at in (92.0, 95.0, 103.0, 106.0)]
-    single = branch(X, np.ones(len(X)), multiplier, doublings)
+    simple = branch(X, np.ones(len(X)), multiplier, doublings)
     pieces = [branch(np.linspace(low, high - 1.0, 50), np.full(50, 2.0), 0.9, turns=2) for low, high in gaps]
-    ranges = found(single, *pieces)
+    ranges = found(simple, *pieces)
     assert ranges[Risk.DOUBLED] == [pytest.approx((low, high - 1.0)) for low, high in gaps]
     assert ranges[Risk.UNSTABLE] == [pytest.approx((high - 1.0, high)) for _, high in gaps]
 
@@ -137,10 +132,8 @@ def test_a_motion_without_damping_is_not_unstable() -> None:
 
 def test_what_is_outside_of_the_branches_has_no_stable_motion() -> None:
     inside = branch(X, np.ones(len(X)), 0.9)
-    assert [(a.low, a.high, a.risk) for a in ranges_to_avoid([inside], 80.0, 111.0)] == [
-        (80.0, 90.0, Risk.UNSTABLE),
-        (110.0, 111.0, Risk.UNSTABLE),
-    ]
+    outside = [(a.low, a.high, a.risk) for a in ranges_to_avoid([inside], 80.0, 111.0)]
+    assert outside == [(80.0, 90.0, Risk.UNSTABLE), (110.0, 111.0, Risk.UNSTABLE)]
 
 
 def test_a_maximum_that_is_no_resonance_is_not_denied(monkeypatch: pytest.MonkeyPatch) -> None:

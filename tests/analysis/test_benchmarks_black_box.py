@@ -48,12 +48,10 @@ class TestQuality:
     def tasks(self) -> dict[str, syn.Task]:
         linkage, phi = self.KNOWN, np.linspace(0.0, 4.0, 7)
         points = linkage.path(phi) + 0.05 * np.random.default_rng(0).normal(size=(7, 2))
-        weights = np.linspace(1.0, 2.0, 7)
+        angle, weights = linkage.rocker_angle(phi) + 0.1 * phi, np.linspace(1.0, 2.0, 7)
         return {
             "timed": syn.TimedPath(points=points, rotation=phi, weights=weights),
-            "rocker": syn.RockerFunction(
-                angle=linkage.rocker_angle(phi) + 0.1 * phi, rotation=phi, mounting=True, weights=weights
-            ),
+            "rocker": syn.RockerFunction(angle=angle, rotation=phi, mounting=True, weights=weights),
         }
 
     @pytest.mark.parametrize("kind", ["timed", "rocker"])
@@ -114,9 +112,8 @@ class TestGrading:
         # l1 + l2 = l3 + l4 at half a turn
         limit = replace(self.APART, rocker_length=0.3)
         black = box(TASK)
-        values = [
-            black.quality(unknowns(black, replace(limit, rocker_length=0.3 + step)))[0] for step in (-1e-9, 0.0, 1e-9)
-        ]
+        near = [replace(limit, rocker_length=0.3 + step) for step in (-1e-9, 0.0, 1e-9)]
+        values = [black.quality(unknowns(black, linkage))[0] for linkage in near]
         np.testing.assert_allclose(values, values[1], rtol=1e-3)
 
     def test_violations_are_those_of_the_constraints(self) -> None:

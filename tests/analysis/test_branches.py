@@ -8,20 +8,9 @@ import pytest
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from analysis import figures
+from analysis import figures, periodic
 from analysis.numerics.continuation import ContinuationError, Follower
-from analysis.periodic import (
-    Branch,
-    Crossing,
-    Drive,
-    Family,
-    OrbitEquations,
-    OrbitError,
-    Stability,
-    find_orbit,
-    follow,
-    switch,
-)
+from analysis.periodic import Branch, Crossing, Drive, Family, Stability, find_orbit, follow, switch
 from analysis.periodic.response.branch import _turn_columns
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
@@ -67,22 +56,16 @@ def test_fold_has_a_multiplier_of_one_and_no_orbit_beyond(softened: Branch) -> N
     assert fold.kind is Crossing.FOLD
     assert fold.orbit.multipliers[0].real == pytest.approx(1.0, abs=1e-6)
     assert fold.parameter == pytest.approx(softened.parameter.min(), rel=1e-3)
-    with pytest.raises(OrbitError):
-        find_orbit(
-            replace(TABLE_3_1, slider_stiffness=0.999 * fold.parameter),
-            speed=SPEED,
-            start=fold.orbit.start,
-            settle=False,
-        )
+    beyond = replace(TABLE_3_1, slider_stiffness=0.999 * fold.parameter)
+    with pytest.raises(periodic.OrbitError):
+        find_orbit(beyond, speed=SPEED, start=fold.orbit.start, settle=False)
     # stable before it, unstable after it
     words = softened.stability()
     assert set(words[: fold.after]) == {Stability.STABLE}
     assert set(words[fold.after + 2 :]) == {Stability.UNSTABLE}
 
 
-def test_a_branch_is_kept_without_a_special_point_that_cannot_be_located(
-    softened: Branch, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_branch_is_kept_without_a_special_point_that_cannot_be_located(softened, monkeypatch) -> None:
     def lose(*_: object) -> None:
         raise ContinuationError("no point there")
 
@@ -92,9 +75,7 @@ def test_a_branch_is_kept_without_a_special_point_that_cannot_be_located(
     branch = follow(softened.family, orbit, value, low=220.0, high=240.0, direction=-1)
     assert len(branch) > 5
     assert branch.special == ()
-    (problem,) = [
-        problem for problem in branch.problems if problem.startswith("the fold between slider.stiffness = 23")
-    ]
+    (problem,) = [one for one in branch.problems if one.startswith("the fold between slider.stiffness = 23")]
     assert problem.endswith("is not located: no point there")
 
 
@@ -138,9 +119,8 @@ def test_a_doubled_branch_ends_where_it_meets_that_of_half_the_period(upper: Bra
     doubling = next(s for s in upper.special if s.kind is Crossing.PERIOD_DOUBLING)
     doubled = switch(upper.family, doubling, low=900.0 * RPM, high=1300.0 * RPM)
     (again,) = doubled.special
-    back = follow(
-        upper.family, doubled.orbits[-1], float(doubled.parameter[-1]), low=890.0 * RPM, high=1300.0 * RPM, direction=1
-    )
+    end, ends = float(doubled.parameter[-1]), {"low": 890.0 * RPM, "high": 1300.0 * RPM}
+    back = follow(upper.family, doubled.orbits[-1], end, **ends, direction=1)
     assert back.reached
     assert back.parameter[-1] == pytest.approx(doubling.parameter, rel=1e-3)
     assert [s.kind for s in back.special] == [Crossing.PERIOD_DOUBLING]
@@ -196,7 +176,7 @@ def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="slider.friction_coefficient")
     # with its derivative from zero on
-    first = OrbitEquations(family, 1, 0.0, 0.2)(orbit.start, 0.0)
+    first = periodic.OrbitEquations(family, 1, 0.0, 0.2)(orbit.start, 0.0)
     step = 1e-4
     moved = [find_orbit(replace(TABLE_3_1, slider_friction_coefficient=n * step), speed=SPEED).start for n in (1, 2)]
     slope = (4.0 * moved[0] - moved[1] - 3.0 * orbit.start) / (2.0 * step)
@@ -271,7 +251,7 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
         greatest = np.abs(turn[output]).max()
         assert of_a_turn[f"greatest {name}"](turn) == of_a_turn[f"greatest {name}"](reversed_turn) == greatest
         assert columns[f"greatest {name}"][20] == greatest
-    path = softened.to_csv(tmp_path / "branch.csv")  # type: ignore[operator]
+    path = softened.to_csv(tmp_path / "branch.csv")
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     assert rows.shape == (len(softened), len(columns))
     assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of slider position u [mm]"
@@ -290,10 +270,8 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
     family = Family(parameters=TABLE_3_1, drive=orbit.drive)
     over_speed = follow(family, orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
     forces = [f"greatest force in pin {pin} [N]" for pin in "ABCD"]
-    for branch, label, factor in (
-        (softened, "slider stiffness [N/m]", 1.0),
-        (over_speed, "crank speed [rpm]", 1.0 / RPM),
-    ):
+    labels = {"slider stiffness [N/m]": (softened, 1.0), "crank speed [rpm]": (over_speed, 1.0 / RPM)}
+    for label, (branch, factor) in labels.items():
         columns = branch.columns()
         figure = figures.plot(branch)
         expected = {

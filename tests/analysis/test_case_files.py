@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from analysis import simulate
 from analysis.mechanisms import FIVE_BAR, PUBLISHED, find_mechanism
 from analysis.run import (
     Harmonics,
@@ -22,6 +21,8 @@ from analysis.run import (
 )
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import TABLE_3_1
+
+from .conftest import run_case
 
 A4_10 = PUBLISHED["rahman-a4-10-s1-3.5"]
 #: Numbers that are short in no unit.
@@ -202,23 +203,14 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
         ('published = "table-3.2"', r"did you mean table-3\.1"),
         ('published = "table-3.1"\n[run]\nstop = 1', r"run\.stop"),
         ('published = "table-3.1"\nspeed = 1', r"did you mean drive\.speed"),
-        (
-            'published = "table-3.1"\n[drive]\ntorque = {kind = "table", times = [0, 1], values = [1]}',
-            r"drive\.torque: a table needs as many",
-        ),
-        (
-            'published = "table-3.1"\n[load]\nfx = {kind = "table", times = [0, 1], values = [1, 2], interpolation = "step"}',
-            r"load\.fx\.interpolation 'step'",
-        ),
+        ('published = "table-3.1"\ndrive.torque = {kind = "table", times = [0], values = []}', "a table needs as many"),
+        ('published = "table-3.1"\nforce = {kind = "table", interpolation = "step"}', r"force\.interpolation 'step'"),
         ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing: .* a constant speed"),
         ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bra"\ntorque = 1', "torsion-bar"),
         ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"', r"drive\.torque\.torque is missing"),
         ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "drive .*only one of torque, speed"),
         ('published = "table-3.1"\n[run]\nrevolutions = 0', r"run\.revolutions is 0: it must be greater than zero"),
-        (
-            'published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"',
-            r"not come together with run\.stop_time",
-        ),
+        ('published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"', "not come together with"),
         ('published = "table-3.1"\n[run]\ntolerance = 2', r"run\.tolerance is 2: it must be between 1e-13 and 0\.01"),
         ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
         ('published = "table-3.1"\ntitle = nan', "title is nan"),
@@ -229,19 +221,10 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
         ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),
         ('published = "rahman-ideal"\n[axial]\nshift = 1.0', "there is no axial.shift"),
         ('published = "rahman-ideal"\n[axial]\ngroove = 1', "axial.groove is 1: it must be true or false"),
-        (
-            'published = "rahman-ideal"\n[axial]\ngroove = true',
-            "groove.amplitude is 0.0: it must be given with axial.groove",
-        ),
-        (
-            'published = "rahman-ideal"\n[axial]\nspeed = 0.1\ngroove = true',
-            "axial is 'speed, groove': it must have only one of",
-        ),
+        ('published = "rahman-ideal"\n[axial]\ngroove = true', "groove.amplitude is 0.0: .* given with axial.groove"),
+        ('published = "rahman-ideal"\n[axial]\nspeed = 0.1\ngroove = true', "'speed, groove': .* only one of"),
         ('published = "rahman-ideal"\n[initial]\nshift_velocity = 0.1', "come with axial.force"),
-        (
-            'published = "rahman-ideal"\n[load]\nfx = "3 N"',
-            "load is 'fx': it must be a quantity, or a table with a kind",
-        ),
+        ('published = "rahman-ideal"\n[load]\nfx = "3 N"', "load is 'fx': .* a quantity, or a table"),
         ('mechanism = ["slider-crank"]', r"mechanism is \['slider-crank'\]: it must be one of five-bar, slider-crank"),
         ('published = "rahman-ideal"\n[coupler]\nlength = 1.0', "there is no coupler.length"),
         ('mechanism = "slider-crank"\n[crank]\nlength = 1.0', "parameter rod.length is missing"),
@@ -279,7 +262,7 @@ stop_time = "0.5 s"
     assert loaded.inputs.shift_speed == Harmonics(0.0, [4.0 * 0.0254], [2.0 * pi], [0.0])
     assert (loaded.inputs.torque, loaded.inputs.speed) == ((10.0,), None)
     assert isinstance(loaded.inputs.load, Piecewise)
-    run = simulate(loaded.parameters, loaded.inputs, initial=loaded.initial, stop_time=0.5, step=loaded.step)
+    run = run_case(loaded, stop_time=0.5)
     assert run.status == 0
     grooved = case(tmp_path, text, **{"axial.groove": True, "groove.amplitude": "2 in"})
     assert grooved.inputs.groove
@@ -290,12 +273,8 @@ def test_overrides_replace_parameters_drive_and_run(tmp_path):
     loaded = case(
         tmp_path,
         'published = "table-3.1"\n[drive]\nspeed = "420 rpm"',
-        **{
-            "slider.stiffness": "5e5 dyn/cm",
-            "drive.torque": "2 N*m",
-            "run.stop_time": "0.1 s",
-            "initial.crank_angle": 0.5,
-        },
+        **{"slider.stiffness": "5e5 dyn/cm", "drive.torque": "2 N*m"},
+        **{"run.stop_time": "0.1 s", "initial.crank_angle": 0.5},
     )
     assert loaded.parameters.slider_stiffness == 500.0
     assert loaded.inputs.speed is None

@@ -6,23 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import InductionMotor, figures
-from analysis.periodic import (
-    OTHER_ORBIT,
-    Crossing,
-    Drive,
-    Family,
-    Stability,
-    StabilityChart,
-    default_range,
-    find_orbit,
-    follow,
-    natural_frequency,
-    newton_orbit,
-    plane,
-    points_to_confirm,
-    stability_chart,
-)
+from analysis import InductionMotor, figures, periodic
+from analysis.periodic import Crossing, Drive, Stability, StabilityChart, default_range, find_orbit, stability_chart
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.chart.grid import Grid, grid_rows
@@ -47,9 +32,8 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> StabilityChart:
     """The first region of rig 2 with spring C."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grids, "grid_folder", lambda: tmp_path_factory.mktemp("grids"))
-        return stability_chart(
-            RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41, beside=linear_motion(RIG_2, DRIVE, NAMES)
-        )
+        linear = linear_motion(RIG_2, DRIVE, NAMES)
+        return stability_chart(RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41, beside=linear)
 
 
 @pytest.fixture
@@ -65,8 +49,8 @@ def test_region_is_traced_and_is_where_the_multipliers_are_great(found: Stabilit
     assert region.kind is Crossing.PERIOD_DOUBLING
     # twice the natural frequency is inside it
     points = region.points
-    assert points[:, 0].min() < 2.0 * natural_frequency(RIG_2) < points[:, 0].max()
-    middle = 2.0 * natural_frequency(RIG_2)
+    assert points[:, 0].min() < 2.0 * periodic.natural_frequency(RIG_2) < points[:, 0].max()
+    middle = 2.0 * periodic.natural_frequency(RIG_2)
     orbit = find_orbit(replace(RIG_2, slider_damping=0.1), speed=middle)
     assert orbit.verdict().stability is Stability.UNSTABLE
     # the grid agrees point by point
@@ -109,7 +93,7 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert all(run.confirmation.agrees for run in found.runs)
     assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
     margins = 1.0 - found.grid.largest
-    rows = points_to_confirm(found.grid)
+    rows = periodic.points_to_confirm(found.grid)
     assert float(margins[rows[0]]) == margins[4:-4, 4:-4].max()
     assert float(margins[rows[1]]) == margins[4:-4, 4:-4].min()
 
@@ -117,13 +101,12 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
 def test_long_runs_are_off_the_edges_unless_only_these_are_unstable() -> None:
     x = np.linspace(0.0, 1.0, 5)
     largest = np.ma.masked_array(0.5 + 0.1 * x[:, None] + 0.2 * x)
-    found = Grid(
-        x=x, y=x, largest=largest, starts=np.zeros((5, 5, 2)), status=np.zeros((5, 5), dtype=np.int64), computed=5
-    )
-    assert points_to_confirm(found)[:2] == [(1, 1), (3, 3)]
-    assert all(0 < place < 4 for point in points_to_confirm(found) for place in point)
+    starts, status = np.zeros((5, 5, 2)), np.zeros((5, 5), dtype=np.int64)
+    found = Grid(x=x, y=x, largest=largest, starts=starts, status=status, computed=5)
+    assert periodic.points_to_confirm(found)[:2] == [(1, 1), (3, 3)]
+    assert all(0 < place < 4 for point in periodic.points_to_confirm(found) for place in point)
     largest[4, 4] = 1.5
-    assert points_to_confirm(found)[1] == (4, 4)
+    assert periodic.points_to_confirm(found)[1] == (4, 4)
 
 
 @pytest.mark.slow
@@ -144,13 +127,12 @@ def test_crossings_of_other_motions_are_traced_under_their_own_name() -> None:
     # the period doubling at 379 to 527 rpm belongs to a motion of some 8 cm, beside the small one that the grid has
     chart = stability_chart(rig, DRIVE, ranges=((460.0 * RPM, 530.0 * RPM), (5.0, 6.0)), points=5)
     doublings = [traced for traced in chart.boundaries if traced.kind is Crossing.PERIOD_DOUBLING]
-    assert {traced.motion for traced in doublings} == {OTHER_ORBIT}
+    assert {traced.motion for traced in doublings} == {periodic.OTHER_ORBIT}
     assert (chart.grid.largest < 1.0).all()
     for traced in doublings:
-        assert traced.starts is not None
         speed, damping = traced.points[len(traced.points) // 2]
         there = replace(rig, slider_damping=damping)
-        orbit = newton_orbit(there, Drive(speed=speed), start=traced.starts[len(traced.points) // 2])
+        orbit = periodic.newton_orbit(there, Drive(speed=speed), start=traced.starts[len(traced.points) // 2])
         assert np.abs(orbit.multipliers + 1.0).min() < 1e-6
         assert orbit.amplitude > 3.0 * find_orbit(there, speed=speed).amplitude
 
@@ -161,12 +143,11 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     # on the branch of one damper: torus at 0.1055 and 0.2644 N.m, period doubling at 0.3395 N.m
     drive = Drive(torque=0.2)
     orbit = find_orbit(TABLE_3_1, torque=0.2, start=(0.0, 0.0, 45.0))
-    family = Family(parameters=TABLE_3_1, drive=drive, vary="drive.torque")
-    branch = follow(family, orbit, 0.2, low=0.15, high=0.45)
+    family = periodic.Family(parameters=TABLE_3_1, drive=drive, vary="drive.torque")
+    branch = periodic.follow(family, orbit, 0.2, low=0.15, high=0.45)
     expected = {special.kind: special.parameter for special in branch.special}
-    chart = stability_chart(
-        TABLE_3_1, drive, ("drive.torque", "slider.damping"), ((0.2, 0.45), (29.0, 31.0)), points=12, start=orbit.start
-    )
+    names, ranges = ("drive.torque", "slider.damping"), ((0.2, 0.45), (29.0, 31.0))
+    chart = stability_chart(TABLE_3_1, drive, names, ranges, points=12, start=orbit.start)
     for kind in (Crossing.TORUS, Crossing.PERIOD_DOUBLING):
         (boundary,) = [traced for traced in chart.boundaries if traced.kind is kind]
         order = np.argsort(boundary.points[:, 1])
@@ -176,27 +157,21 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     row = int(np.abs(chart.grid.y - 30.0).argmin())
     unstable = chart.grid.largest[row] > 1.0
     assert unstable[chart.grid.x > expected[Crossing.PERIOD_DOUBLING] + 0.03].all()
-    assert not unstable[
-        (chart.grid.x > expected[Crossing.TORUS] + 0.02) & (chart.grid.x < expected[Crossing.PERIOD_DOUBLING] - 0.02)
-    ].any()
+    low, high = expected[Crossing.TORUS] + 0.02, expected[Crossing.PERIOD_DOUBLING] - 0.02
+    assert not unstable[(chart.grid.x > low) & (chart.grid.x < high)].any()
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest(tmp_path: Path) -> None:
-    chart = stability_chart(
-        TABLE_3_1,
-        Drive(speed=SETS["table-3.1"].crank_speed),
-        ("crank.length", "rocker.length"),
-        ((0.05, 0.5), (0.14, 0.16)),
-        points=2,
-    )
+    speed = SETS["table-3.1"].crank_speed
+    names, ranges = ("crank.length", "rocker.length"), ((0.05, 0.5), (0.14, 0.16))
+    chart = stability_chart(TABLE_3_1, Drive(speed=speed), names, ranges, points=2)
     # a crank longer than coupler and rocker together cannot turn wherever the slider is
     missing = np.ma.getmaskarray(chart.grid.largest)
     x, y = np.meshgrid(chart.grid.x, chart.grid.y)
     assert np.array_equal(missing, x > TABLE_3_1.coupler_length + y)
     assert missing.tolist() == [[False, True], [False, True]]
-    speed = SETS["table-3.1"].crank_speed
     for i in (0, 1):
         there = replace(TABLE_3_1, crank_length=chart.grid.x[0], rocker_length=chart.grid.y[i])
         assert chart.grid.largest[i, 0] == pytest.approx(find_orbit(there, speed=speed).largest, rel=1e-6)
@@ -220,7 +195,7 @@ def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest(tmp_p
 
 
 def test_default_ranges() -> None:
-    natural = natural_frequency(RIG_2)
+    natural = periodic.natural_frequency(RIG_2)
     assert default_range(RIG_2, DRIVE, "drive.speed") == pytest.approx((0.3 * natural, 2.5 * natural))
     assert default_range(RIG_2, DRIVE, "slider.damping") == pytest.approx((0.55, 11.0))
     with pytest.raises(InputError, match=r"slider\.coulomb_friction is 0"):
@@ -230,19 +205,17 @@ def test_default_ranges() -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "ranges"),
+    ("y", "across", "along"),
     [
-        (("drive.speed", "drive.speed"), ((1.0, 2.0), (1.0, 2.0))),
-        (("drive.speed", "slider.mess"), ((1.0, 2.0), (1.0, 2.0))),
-        (("drive.speed", "slider.damping"), ((2.0, 1.0), (1.0, 2.0))),
-        (("drive.speed", "slider.damping"), ((1.0, 2.0), (-1.0, 2.0))),
+        ("drive.speed", (1.0, 2.0), (1.0, 2.0)),
+        ("slider.mess", (1.0, 2.0), (1.0, 2.0)),
+        ("slider.damping", (2.0, 1.0), (1.0, 2.0)),
+        ("slider.damping", (1.0, 2.0), (-1.0, 2.0)),
     ],
 )
-def test_bad_charts_are_refused(
-    names: tuple[str, str], ranges: tuple[tuple[float, float], tuple[float, float]]
-) -> None:
+def test_bad_charts_are_refused(y: str, across: tuple[float, float], along: tuple[float, float]) -> None:
     with pytest.raises(LinkworkError):
-        stability_chart(RIG_2, DRIVE, names, ranges, points=3)
+        stability_chart(RIG_2, DRIVE, ("drive.speed", y), (across, along), points=3)
 
 
 @pytest.mark.slow
@@ -282,10 +255,8 @@ MOTOR = Drive(motor=InductionMotor(breakdown_torque=0.06, breakdown_slip=0.3, sy
         (MOTOR, "drive.torque.synchronous_speed", "slider.damping", (50.0, 70.0)),
     ],
 )
-def test_a_row_of_named_parameters_has_the_numbers_of_its_points(
-    drive: Drive, x: str, y: str, across: tuple[float, float]
-) -> None:
-    operation = plane(RIG_2, drive, x, y)
+def test_a_row_of_named_parameters_has_the_numbers_of_its_points(drive, x, y, across) -> None:
+    operation = periodic.plane(RIG_2, drive, x, y)
     xs, ys = np.linspace(*across, 5), np.array([parameter_value(RIG_2, drive, y) or 1.0])
     start = first_guess(operating_point(RIG_2, drive).flow, drive, None)
     (at_once,) = grid_rows(operation, xs, ys, start)
@@ -296,8 +267,9 @@ def test_a_row_of_named_parameters_has_the_numbers_of_its_points(
 
 
 def test_a_row_of_named_parameters_refuses_what_its_points_refuse() -> None:
-    start = np.zeros(2)
-    with pytest.raises(InputError, match="speed"):
-        grid_rows(plane(RIG_2, DRIVE, "drive.speed", "slider.damping"), np.array([10.0, -1.0]), np.array([1.0]), start)
-    with pytest.raises(ParameterError, match=r"mass.*-0\.1"):
-        grid_rows(plane(RIG_2, DRIVE, "slider.mass", "drive.speed"), np.array([1.0, -0.1]), np.array([50.0]), start)
+    for names, x, y, said in (
+        (("drive.speed", "slider.damping"), [10.0, -1.0], 1.0, "speed"),
+        (("slider.mass", "drive.speed"), [1.0, -0.1], 50.0, r"mass.*-0\.1"),
+    ):
+        with pytest.raises((InputError, ParameterError), match=said):
+            grid_rows(periodic.plane(RIG_2, DRIVE, *names), np.array(x), np.array([y]), np.zeros(2))

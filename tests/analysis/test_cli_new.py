@@ -113,18 +113,18 @@ def write(folder, text):
 def test_a_new_run_runs_as_it_is(linkwork, tmp_path, kind):
     written = linkwork("new", kind)
     assert written.output == f"wrote {kind}.toml; next: linkwork run {kind}.toml\n"
-    assert linkwork("run", f"{kind}.toml", "--no-plot").exit_code == 0
+    linkwork("run", f"{kind}.toml", "--no-plot")
     assert (tmp_path / "out" / f"{kind}.csv").is_file()
 
 
 def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tmp_path):
     assert linkwork("new", LINKAGE).output == "wrote linkage.toml; next: linkwork linkage linkage.toml\n"
-    assert "coupler, rocker" in linkwork("linkage", "linkage.toml").output
+    assert "coupler, rocker" in linkwork("linkage linkage.toml").output
     assert (tmp_path / "out" / "linkage-linkage.png").is_file()
-    assert "def places(" in linkwork("linkage", "linkage.toml", "--equations").output
+    assert "def places(" in linkwork("linkage linkage.toml --equations").output
     (tmp_path / "case.toml").write_text('linkage = "linkage.toml"\n')
-    assert "coupler, rocker" in linkwork("linkage", "case.toml").output
-    assert linkwork("run", "linkage.toml", "--no-plot").exit_code == 0
+    assert "coupler, rocker" in linkwork("linkage case.toml").output
+    linkwork("run linkage.toml --no-plot")
     text = (tmp_path / "linkage.toml").read_text()
     for kind in (Body, Slide, Slot, Gear, Rack, Spring, Description):
         for name in entry_names(kind):
@@ -136,7 +136,6 @@ def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tm
 def test_a_new_synthesis_runs_as_it_is(linkwork, kind):
     linkwork("new", kind)
     result = linkwork("synthesize", f"{kind}.toml", *QUICK)
-    assert result.exit_code == 0, result.stderr
     assert "defects" not in result.stderr
 
 
@@ -144,7 +143,6 @@ def test_a_new_synthesis_runs_as_it_is(linkwork, kind):
 def test_a_new_tuning_runs_as_it_is(linkwork):
     linkwork("new", TUNING)
     result = linkwork("tune", f"{TUNING}.toml", "--no-plot")
-    assert result.exit_code == 0, result.stderr
     assert "slider.stiffness" in result.output
 
 
@@ -152,27 +150,26 @@ def test_a_new_tuning_runs_as_it_is(linkwork):
 def test_a_new_slider_motion_runs_as_it_is(linkwork):
     linkwork("new", SLIDER)
     result = linkwork("slider-motion", f"{SLIDER}.toml", *QUICK, "--set", "slider.starts=3")
-    assert result.exit_code == 0, result.stderr
     assert "slider, 2 harmonics" in result.output
 
 
 @pytest.mark.parametrize("kind", MECHANISMS)
 def test_parameters_alone(linkwork, tmp_path, kind):
-    assert linkwork("new", kind, "p.toml", "--parameters").exit_code == 0
+    linkwork("new", kind, "p.toml", "--parameters")
     published = next(iter(MECHANISMS[kind].published.values())).parameters
     made = load_parameters(tmp_path / "p.toml")
     for name in published.__slots__:
         assert getattr(made, name) == pytest.approx(getattr(published, name), rel=1e-9)
     if kind == "slider-crank":
-        assert linkwork("slider-crank", "info", "p.toml").exit_code == 0
+        linkwork("slider-crank info p.toml")
 
 
 def test_what_it_does_not_write(linkwork, tmp_path):
     (tmp_path / "motion.toml").write_text("mine")
-    result = linkwork("new", "motion")
+    result = linkwork("new motion", code=2)
     assert "motion.toml is there already: give --force to write over it, or another name" in result.stderr
     assert (tmp_path / "motion.toml").read_text() == "mine"
-    assert linkwork("new", "motion", "--force").exit_code == 0
+    linkwork("new motion --force")
     assert tomllib.loads((tmp_path / "motion.toml").read_text())["task"]["kind"] == "motion"
     assert [line.split()[0] for line in linkwork("new").output.splitlines()] == list(kinds())
 

@@ -10,11 +10,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import analysis.synthesis as syn
 from analysis import cli, figures
-from analysis.files import entry_names
+from analysis.files import entry_names, read_rows
 from analysis.numerics.symbolic import library
 from analysis.run import Inputs, load_case, load_parameters, read_case, simulate
 from analysis.synthesis.case import case as cases
@@ -23,12 +22,17 @@ from analysis.synthesis.case.tables import KINDS
 from analysis.synthesis.search.statement import trace_requirement
 from analysis.synthesis.task.constraint import UNKNOWNS
 from linkwork.errors import InputError, LinkworkError, ParameterError
+from tests import scripts
+
+from .conftest import csv, run_case
 
 ROOT = Path(__file__).parents[2]
 ELLIPSE = '[task]\nkind = "timed-path"\nx = "20 + 10*cos(t)"\ny = "15 + 5*sin(t)"\nunit = "cm"\nn = 24\n'
 #: Few starts: enough for an ellipse.
 QUICK = "[search]\ncandidates = 4096\nstarts = 3\nsolutions = 2\n"
 CAPPED = ELLIPSE + QUICK + '[constraints]\nlargest_link = "50 cm"\n'
+TRADED = CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n'
+ROCKING = syn.Linkage(ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2, point_distance=0.1)
 SQUARE = "[[0, 0], [1, 0], [1, 1], [0, 1]]"
 
 
@@ -44,12 +48,8 @@ def case(text: str, folder: Path, **overrides):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    (folder / "case.toml").write_text(CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n')
-    result = CliRunner().invoke(
-        cli.main, ["synthesize", str(folder / "case.toml"), "--out", str(folder / "out")], catch_exceptions=False
-    )
-    assert result.exit_code == 0, result.output
-    return result, folder
+    (folder / "case.toml").write_text(TRADED)
+    return scripts.linkwork("synthesize", folder / "case.toml", "--out", folder / "out"), folder
 
 
 def test_it_reports_and_writes_what_it_found(run) -> None:
@@ -61,65 +61,52 @@ def test_it_reports_and_writes_what_it_found(run) -> None:
         "best-plates.dxf", "best-plates.svg", "best-sheet.pdf", "linkage.toml",
     }  # fmt: skip
     assert all(f"wrote {folder / 'out' / name}" in result.output for name in written)
-    rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
-    first = rows[0] if rows.ndim else rows
+    first = read_rows(folder / "out" / "solutions.csv")[0]
     # as reported, in mm2, and what the curve's file adds up to
-    assert f"{1e6 * first['quality_[m2]']:.5g}" in result.output
-    curve = np.genfromtxt(folder / "out" / "best-curve.csv", delimiter=",", names=True, deletechars="")
-    assert (curve["error_[m]"] ** 2).sum() == pytest.approx(first["quality_[m2]"])
-    assert first["ground_length_[m]"] <= 0.5 + 1e-6
-    assert first["least_transmission_angle_[rad]"] >= radians(40.0) - 1e-6
-    trade = np.genfromtxt(folder / "out" / "trade-off.csv", delimiter=",", names=True, deletechars="")
-    assert trade["quality_[m2]"][0] > trade["quality_[m2]"][1]
+    quality = float(first["quality [m2]"])
+    assert f"{1e6 * quality:.5g}" in result.output
+    assert (csv(folder / "out" / "best-curve.csv")["error [m]"] ** 2).sum() == pytest.approx(quality)
+    assert float(first["ground_length [m]"]) <= 0.5 + 1e-6
+    assert float(first["least transmission angle [rad]"]) >= radians(40.0) - 1e-6
+    trade = [float(row["quality [m2]"]) for row in read_rows(folder / "out" / "trade-off.csv")]
+    assert trade[0] > trade[1]
     assert "crank-rocker" in result.output
     assert "no circuit defect" not in result.output
 
 
 def test_the_five_bar_runs_and_its_point_traces_the_path(run, linkwork) -> None:
     _, folder = run
-    assert (
-        "bars 20 x 5 mm of 7850 kg/m³" in (folder / "out" / "five-bar.toml").read_text(encoding="utf-8").splitlines()[0]
-    )
+    head, _ = (folder / "out" / "five-bar.toml").read_text(encoding="utf-8").split("\n", 1)
+    assert "bars 20 x 5 mm of 7850 kg/m³" in head
     chosen = load_case(folder / "out" / "five-bar.toml")
     assert load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
-    motion = simulate(
-        chosen.parameters, chosen.inputs, initial=chosen.initial, stop_time=chosen.stop_time, step=chosen.step
-    )
-    curve = np.genfromtxt(folder / "out" / "best-curve.csv", delimiter=",", names=True, deletechars="")
+    motion = run_case(chosen)
+    curve = csv(folder / "out" / "best-curve.csv")
     # the plant's frame is that of the ground link, from A
-    rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
-    first = rows[0] if rows.ndim else rows
-    a1 = float(first["ground_angle_[rad]"])
+    first = read_rows(folder / "out" / "solutions.csv")[0]
+    a1, *pivot = (float(first[name]) for name in ("ground_angle [rad]", "pivot_x [m]", "pivot_y [m]"))
     place = np.column_stack([motion["coupler.point.x"], motion["coupler.point.y"]])
-    plane = place @ np.array([[cos(a1), sin(a1)], [-sin(a1), cos(a1)]]) + [first["pivot_x_[m]"], first["pivot_y_[m]"]]
-    made = np.column_stack([curve["path_x_[m]"], curve["path_y_[m]"]])
+    plane = place @ np.array([[cos(a1), sin(a1)], [-sin(a1), cos(a1)]]) + pivot
+    made = np.column_stack([curve["path x [m]"], curve["path y [m]"]])
     # samples a 360th of a turn apart; the slider gives by some micrometres
     assert len(plane) == 721
     np.testing.assert_allclose(plane[360 : 720 : 360 // len(made)], made, atol=1e-4)
     assert np.abs(motion["slider.position"]).max() < 1e-4
-    result = linkwork("run", folder / "out" / "five-bar.toml", "--no-plot")
-    assert result.exit_code == 0, result.output
+    linkwork("run", folder / "out" / "five-bar.toml", "--no-plot")
 
 
 def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
-    again = [
-        linkwork(
-            "synthesize", "case.toml", "--no-plots", "--out", out, "--seed", 3, "--jobs", 1, "--set", "task.n=36",
-            "--set", "constraints.largest_link=45 cm", "--set", 'bounds.crank_length=["10 mm", "80 mm"]',
-        )
-        for out in ("a", "b")
-    ]  # fmt: skip
-    assert [r.exit_code for r in again] == [0, 0]
+    settings = """--set task.n=36 --set 'constraints.largest_link=45 cm' --set 'bounds.crank_length=[0.01, "80 mm"]'"""
+    for out in ("a", "b"):
+        linkwork(f"synthesize case.toml --no-plots --seed 3 --jobs 1 --out {out} {settings}")
     first, second = (Path(out, "solutions.csv").read_bytes() for out in ("a", "b"))
     assert first == second
     assert not list(Path("a").glob("*.png"))
-    assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
-    result = linkwork("synthesize", "case.toml", "--jobs", 0)
-    assert result.exit_code == 2
+    assert len(read_rows(Path("a/best-curve.csv"))) == 36
+    result = linkwork("synthesize case.toml --jobs 0", code=2)
     assert "0 is neither -1, for all, nor a number of cores" in " ".join(result.stderr.split())
-    values = np.genfromtxt("a/solutions.csv", delimiter=",", names=True, deletechars="")
-    assert np.max(values["ground_length_[m]"]) <= 0.45 + 1e-6
+    assert max(float(row["ground_length [m]"]) for row in read_rows(Path("a/solutions.csv"))) <= 0.45 + 1e-6
 
 
 def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
@@ -149,9 +136,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     solution = syn.Solution.from_linkage(task, linkage)
     assert not solution.verdicts.full_turn
     ran = read_case(syn.run_case(solution, syn.MachineSpec(speed=3.0), "swing"), folder=tmp_path)
-    motion = simulate(
-        ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
-    )
+    motion = run_case(ran, step=ran.stop_time / 10.0)
     place = np.column_stack([motion["coupler.point.x"], motion["coupler.point.y"]])
     np.testing.assert_allclose(place, linkage.path(at), atol=1e-4)
     # the slider starts in equilibrium: with the crank at rest it stays
@@ -161,36 +146,27 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
 
 
 def test_a_slider_that_does_not_settle_starts_at_its_zero() -> None:
-    linkage = syn.Linkage(
-        ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2, point_distance=0.1
-    )
-    solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(12)) + 1e-3), linkage)
+    solution = syn.Solution.from_linkage(syn.TimedPath(points=ROCKING.path(syn.turn(12)) + 1e-3), ROCKING)
     made = syn.run_case(solution, syn.MachineSpec(slider_stiffness=2000.0, slider_damping=0.0), "undamped")
     assert (made["initial"]["slider_position"], made["initial"]["slider_velocity"]) == ("0.0 m", "0.0 m/s")
 
 
+def both_runs(solution, make, folder, stop_time):
+    """Runs of the linkage as it is described in words, and as the hand-written mechanism."""
+    for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other")):
+        yield run_case(read_case(tables, folder=folder), stop_time=stop_time, step=stop_time / 80.0)
+
+
 @pytest.mark.parametrize(
-    ("point", "given"),
-    [
-        ((0.1, 0.5), {}),
-        ((0.1, 0.5), {"coupler_mass": 0.6}),
-        ((0.3, 0.0), {"load": (0.0, 0.0)}),
-        ((0.25, 0.0), {}),
-        ((0.0, 0.0), {}),
-    ],
+    ("distance", "angle", "given"),
+    [(0.1, 0.5, {}), (0.1, 0.5, {"coupler_mass": 0.6}), (0.3, 0.0, {"load": (0, 0)}), (0.25, 0.0, {}), (0.0, 0.0, {})],
 )
-def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, given) -> None:
-    linkage = syn.Linkage(
-        ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2,
-        point_distance=point[0], point_angle=point[1], ground_angle=0.3,
-    )  # fmt: skip
+def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, distance, angle, given) -> None:
+    linkage = replace(ROCKING, point_distance=distance, point_angle=angle, ground_angle=0.3)
     at = np.linspace(0.0, 6.0, 13)
     solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(at) + 1e-3, rotation=at), linkage)
     make = syn.MachineSpec(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
-    runs = []
-    for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other")):
-        ran = read_case(tables, folder=tmp_path)
-        runs.append(simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.8, step=0.01))
+    runs = list(both_runs(solution, make, tmp_path, 0.8))
     # of the other file a stiff spring holds the rocker's pivot, which starts in its steady motion
     torques = [run["drive.applied_torque"] for run in runs]
     np.testing.assert_allclose(*torques, atol=2e-3 * np.abs(torques[0]).max())
@@ -205,26 +181,19 @@ def test_both_files_of_a_slider_crank_have_the_same_spring_damper_and_friction(t
     spring = {"slider_stiffness": 900.0, "slider_spring_free_position": 0.15}
     make = syn.MachineSpec(speed=15.0, slider_damping=40.0, slider_coulomb_friction=3.0, **spring)
     solution = syn.Solution.from_linkage(task, crank)
-    described, hand = (
-        _run(tables, tmp_path, 0.4)
-        for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other"))
-    )
+    described, hand = both_runs(solution, make, tmp_path, 0.4)
     torque = described["drive.applied_torque"]
     np.testing.assert_allclose(hand["drive.applied_torque"], torque, atol=1e-6 * np.abs(torque).max())
 
 
 def test_a_load_on_the_slider_goes_through_its_pin(tmp_path) -> None:
     """At rest, with light bars on a level guide without an offset, the coupler alone holds the slider against the load."""
-    crank = syn.SliderCrank(
-        ground_length=0.0, crank_length=0.05, coupler_length=0.2, point_distance=0.2, ground_angle=0.5 * pi
-    )
+    lengths = {"ground_length": 0.0, "crank_length": 0.05, "coupler_length": 0.2, "point_distance": 0.2}
+    crank = syn.SliderCrank(**lengths, ground_angle=0.5 * pi)
     task = syn.SliderFunction(position=[-0.2, -0.15, -0.2], rotation=[0.0, 1.0, 2.0])
     make = syn.MachineSpec(speed=1e-6, density=1e-6, slider_mass=1.0, gravity=0.0, load=(-60.0, 0.0))
     solution = syn.Solution.from_linkage(task, crank)
-    described, hand = (
-        _run(tables, tmp_path, 0.1)
-        for tables in (syn.described_case(solution, make, "one"), syn.run_case(solution, make, "other"))
-    )
+    described, hand = both_runs(solution, make, tmp_path, 0.1)
     # the crank points along the guide's normal: sin(b) = 50 / 200
     wanted = 60.0 / cos(asin(0.25))
     for run, pins in ((described, "ABC"), (hand, ("bearing", "crank_pin", "slider_pin"))):
@@ -237,21 +206,16 @@ def test_a_load_that_the_slider_cranks_case_leaves_out_is_named(linkwork, tmp_pa
     case = 'task = {{ kind = "quick-return", stroke = 0.1, time_ratio = 1.1 }}\nmake = {{ load = [{}, {}] }}\n'
     for load, noted in (((-30.0, 0.0), False), ((-30.0, -4.0), True)):
         (tmp_path / "case.toml").write_text(case.format(*load))
-        said = linkwork("synthesize", "case.toml", "--no-plots").stderr
+        said = linkwork("synthesize case.toml --no-plots").stderr
         assert ("without the 4 N of make.load across the guide" in said) == noted
         assert ("across the guide" in Path("out/slider-crank.toml").read_text().partition("\n")[0]) == noted
-
-
-def _run(tables, folder, stop_time):
-    ran = read_case(tables, folder=folder)
-    return simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=stop_time, step=stop_time / 20.0)
 
 
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     asked = []
     monkeypatch.setattr(figures, "animate", lambda solution, path, **more: asked.append((path.name, more)) or path)
-    assert linkwork("synthesize", "case.toml", "--no-plots", "--animate").exit_code == 0
+    linkwork("synthesize case.toml --no-plots --animate")
     assert asked == [("best.gif", {"title": "case"})]
 
 
@@ -263,8 +227,7 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
         raise syn.SynthesisInterrupted(found(*arguments, **more), 2, 3)
 
     monkeypatch.setattr(cases, "synthesize", stopped)
-    result = linkwork("synthesize", "case.toml", "--no-plots")
-    assert result.exit_code == cli.INTERRUPTED
+    result = linkwork("synthesize case.toml --no-plots", code=cli.INTERRUPTED)
     assert "stopped after 2 of 3 searches; the best so far is kept" in result.stderr
     assert Path("out/solutions.csv").exists()
 
@@ -272,7 +235,7 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
         raise syn.SynthesisInterrupted(None, 0, 3)
 
     monkeypatch.setattr(cases, "synthesize", nothing)
-    assert linkwork("synthesize", "case.toml", "--out", "none").exit_code == cli.INTERRUPTED
+    linkwork("synthesize case.toml --out none", code=cli.INTERRUPTED)
     assert not Path("none").exists()
 
 
@@ -291,9 +254,7 @@ def test_a_clockwise_path_in_step_with_a_counter_clockwise_crank_is_noted(points
 
 
 def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypatch) -> None:
-    (tmp_path / "case.toml").write_text(
-        CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n'
-    )
+    (tmp_path / "case.toml").write_text(TRADED)
 
     def stopped(self, **more):
         found = self.solve()
@@ -301,8 +262,7 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
         raise syn.TradeOffInterrupted(front, 1, 4)
 
     monkeypatch.setattr(cases.SynthesisCase, "trade", stopped)
-    result = linkwork("synthesize", "case.toml", "--no-plots")
-    assert result.exit_code == cli.INTERRUPTED
+    result = linkwork("synthesize case.toml --no-plots", code=cli.INTERRUPTED)
     assert "stopped after 1 of 4 problems of the trade-off; what there is is kept" in result.stderr
     # that there is no linkage would be known only after the whole search
     assert "none found yet" in result.stdout
@@ -321,8 +281,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         return replace(result, solutions=(replace(result.best, verdicts=verdicts),))
 
     monkeypatch.setattr(cases, "synthesize", spoilt)
-    result = linkwork("synthesize", "case.toml", "--no-plots")
-    assert result.exit_code == 0
+    result = linkwork("synthesize case.toml --no-plots")
     said = " ".join(result.stderr.split())
     assert "none of them is free of defects" in said
     assert "branch defect" in said
@@ -347,10 +306,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE + 'weights = [{ from = "4 deg", to = "50 deg" }]', "task.weights[0].weight is missing"),
         (ELLIPSE + 'rotation = { from = "0 deg" }', "task.rotation.to is missing"),
         ('[task]\nkind = "timed-path"\npoints = [[0, 0], [1, 1]]', "there must be at least 3"),
-        (
-            '[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]',
-            "points[1][0] is nan: it must be a finite number",
-        ),
+        ('[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]', "points[1][0] is nan"),
         ('[task]\nkind = "timed-path"\npoints = []', "0 are too few"),
         ('[task]\nkind = "timed-path"\npoints = [["1", 0], [1, 1]]', "come with its unit"),
         ('[task]\nkind = "untimed-path"\nfile = "none.svg"', "none.svg cannot be read"),
@@ -398,16 +354,15 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
 )
 def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, text, said) -> None:
     (tmp_path / "case.toml").write_text(text)
-    result = linkwork("synthesize", "case.toml")
-    assert result.exit_code == cli.WRONG, result.output
+    result = linkwork("synthesize case.toml", code=cli.WRONG)
     assert said in " ".join(result.stderr.split())
     assert "Traceback" not in result.output + result.stderr
 
 
 def test_a_setting_without_a_value_is_refused(linkwork, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(ELLIPSE)
-    assert linkwork("synthesize", "case.toml", "--set", "nonsense").exit_code == 2
-    assert linkwork("synthesize", "case.toml", "--set", "task.n.m=3").exit_code == cli.WRONG
+    linkwork("synthesize case.toml --set nonsense", code=2)
+    linkwork("synthesize case.toml --set task.n.m=3", code=cli.WRONG)
 
 
 # Tasks from tables
@@ -480,9 +435,8 @@ def test_the_end_of_a_turn_is_its_start(tmp_path) -> None:
 def test_a_function_of_the_rocker_as_formula_list_and_file(tmp_path) -> None:
     phi = np.linspace(0.0, pi, 7)
     angle = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
-    (tmp_path / "rocker.csv").write_text(
-        "\n".join(f"{degrees(p)!r};{a!r}" for p, a in zip(phi.tolist(), angle.tolist()))
-    )
+    rows = "\n".join(f"{degrees(p)!r};{a!r}" for p, a in zip(phi.tolist(), angle.tolist()))
+    (tmp_path / "rocker.csv").write_text(rows)
     kind = '[task]\nkind = "rocker-function"\nangle_unit = "deg"\n'
     formula = kind + 'angle = "70 + 100*abs(sin(t/2))"\nn = 7\nend = "180 deg"\nmounting = true\n'
     listed = f'{kind}angle = {angle.tolist()}\nrotation = {{ from = 0, to = "180 deg" }}\n'
@@ -518,9 +472,8 @@ def test_an_untimed_path_with_a_straight_part_or_smoothed(tmp_path) -> None:
     assert task.straight.rotation == pytest.approx(pi / 2.0)
     (tmp_path / "hand-drawn.svg").write_text((ROOT / "examples" / "hand-drawn.svg").read_text())
     drawn = '[task]\nkind = "untimed-path"\nfile = "hand-drawn.svg"\nname = "curve"\nsmoothing = '
-    rough, smooth = (
-        case(drawn + how, tmp_path).task.path for how in ("false", '{ points = 90, deviation = "0.5 mm" }')
-    )
+    ways = ("false", '{ points = 90, deviation = "0.5 mm" }')
+    rough, smooth = (case(drawn + way, tmp_path).task.path for way in ways)
     assert len(smooth.points) == 90
     assert smooth.closed
     assert smooth.length < rough.length
@@ -537,10 +490,9 @@ def test_bounds_constraints_and_the_rest(tmp_path) -> None:
         + '[trade_off]\nover = "transmission"\nlimits = ["20 deg", "40 deg"]\n'
     )
     found = case(text, tmp_path)
-    assert found.bounds == {
-        "ground_angle": (pytest.approx(radians(30.0)),) * 2,
-        "crank_length": (0.01, pytest.approx(0.08)),
-    }
+    assert {*found.bounds} == {"ground_angle", "crank_length"}
+    assert found.bounds["ground_angle"] == pytest.approx((radians(30.0), radians(30.0)))
+    assert found.bounds["crank_length"] == pytest.approx((0.01, 0.08))
     kinds = [type(c).__name__ for c in found.constraints[:6]]
     assert kinds == ["LeastTransmission", "FullTurn", "Grashof", "LargestLink", "Assembly", "PivotRegion"]
     assert (found.constraints[0].angle, found.constraints[0].over) == (pytest.approx(radians(35.0)), "task")
@@ -557,9 +509,8 @@ def test_bounds_constraints_and_the_rest(tmp_path) -> None:
 
 
 def test_overrides_reach_any_depth(tmp_path) -> None:
-    found = case(
-        CAPPED, tmp_path, **{"task.rotation.to": "200 deg", "task.rotation.from": 0, "search.seed": 7, "title": "x"}
-    )
+    settings = {"task.rotation.to": "200 deg", "task.rotation.from": 0, "search.seed": 7, "title": "x"}
+    found = case(CAPPED, tmp_path, **settings)
     assert found.task.rotation[-1] == pytest.approx(radians(200.0))
     assert (found.search.seed, found.title) == (7, "x")
 
@@ -572,9 +523,8 @@ def test_json_does_as_well(tmp_path) -> None:
 
 
 def test_the_examples_and_the_documentation_are_readable() -> None:
-    examples = [
-        p for p in (ROOT / "examples").glob("*.toml") if "[task]" in p.read_text() and "[slider" not in p.read_text()
-    ]
+    texts = {path: path.read_text() for path in (ROOT / "examples").glob("*.toml")}
+    examples = [path for path, text in texts.items() if "[task]" in text and "[slider" not in text]
     assert len(examples) >= 4
     for path in examples:
         syn.load_synthesis_case(path)

@@ -41,9 +41,8 @@ ROOT = Path(__file__).parents[2]
 def call(mechanism: Mechanism, which: int, size: int, x: Any, modes: Any, u: Any, p: Any) -> np.ndarray:
     """A function of the equations at one state."""
     out = np.empty((1, size))
-    compiled.rows(
-        machine(mechanism).addresses[which], 1, np.array(modes), np.array([*p, 0.3]), np.array([x]), np.array([u]), out
-    )
+    address, parameters = machine(mechanism).addresses[which], np.array([*p, 0.3])
+    compiled.rows(address, 1, np.array(modes), parameters, np.array([x]), np.array([u]), out)
     return out[0]
 
 
@@ -167,6 +166,15 @@ def test_a_sparse_output_and_an_operation_without_counterpart_are_refused() -> N
 # --- The cache
 
 
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for compiled code, and one for temporary files beside it."""
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    return tmp_path / "cache"
+
+
 def flipped(content: bytes, share: float) -> bytes:
     """Return bytes of which one bit, at a share of their length, is another."""
     changed = bytearray(content)
@@ -199,24 +207,19 @@ def _compile_and_run() -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_second_process_finds_the_code_of_the_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+def test_second_process_finds_the_code_of_the_first(cache: Path) -> None:
     first = run_in_process(_compile_and_run, timeout=180.0)
     second = run_in_process(_compile_and_run)
     assert (first["hits"], first["misses"]) == (0, 5)
     assert (second["hits"], second["misses"]) == (5, 0)
     assert second["seconds"] < 0.5 * first["seconds"]
     assert second["position"] == first["position"]
-    assert len(list((tmp_path / "cache").glob("numba-*"))) == 5
-    assert any((tmp_path / "cache").rglob("*.nbi"))
+    assert len(list(cache.glob("numba-*"))) == 5
+    assert any(cache.rglob("*.nbi"))
 
 
-def test_each_compilation_says_once_what_it_is_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("cache")
+def test_each_compilation_says_once_what_it_is_for(monkeypatch: Any, capsys: Any) -> None:
     monkeypatch.setattr(codegen._Announcer, "said", set())
 
     @inner
@@ -252,17 +255,12 @@ def test_fingerprint_follows_every_function_and_constant_that_is_compiled() -> N
     assert len(same | others) == 3
 
 
-def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    blocked = tmp_path / "blocked"
-    blocked.touch()
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(blocked / "below a file"))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
+def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(cache: Path, monkeypatch: Any) -> None:
+    cache.touch()
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(cache / "below a file"))
     folder = code_folder("a")
     assert folder.is_dir()
-    assert folder.is_relative_to(tmp_path / "temporary")
+    assert folder.is_relative_to(tempfile.tempdir or "")
     # the same again for the next process
     assert code_folder("a") == folder
 
@@ -283,9 +281,8 @@ def _made(function: Any = _example) -> Kernel:
 
 
 @pytest.fixture
-def carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def carried(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The code for any processor of a kernel; the cache is empty, and compilations are announced."""
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
     monkeypatch.setattr(codegen._Announcer, "said", set())
     path = _made().carry()
@@ -293,9 +290,7 @@ def carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def test_code_for_any_processor_is_used_without_compiling(
-    carried: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_code_for_any_processor_is_used_without_compiling(carried: Path, capsys: Any) -> None:
     assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)
     assert any((carried.parents[1] / "cache").rglob("*.nbc"))
     carried.unlink()
@@ -306,9 +301,7 @@ def test_code_for_any_processor_is_used_without_compiling(
 
 
 @pytest.mark.parametrize("harm", [0.0, 0.5, 0.9999, "another LLVM"])
-def test_code_for_any_processor_that_cannot_be_read_is_not_used(
-    carried: Path, harm: float | str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_code_for_any_processor_that_cannot_be_read_is_not_used(carried: Path, harm: Any, capsys: Any) -> None:
     content = carried.read_bytes()
     if isinstance(harm, float):
         carried.write_bytes(flipped(content, harm))
@@ -343,11 +336,8 @@ def test_weighted_sums_of_rows_are_added_in_the_order_of_their_weights() -> None
 
     generator = np.random.default_rng(1)
     for columns in (1, 2, 3, 6):
-        rows, x, (out, without_x) = (
-            generator.normal(size=(3, columns)),
-            generator.normal(size=columns),
-            np.full((2, columns), 9.0),
-        )
+        rows, x = generator.normal(size=(3, columns)), generator.normal(size=columns)
+        out, without_x = np.full((2, columns), 9.0)
         both(0, x, rows, 0.3, out, without_x)
         assert (np.array([out, without_x]) == 9.0).all(), "the sum number 0 is empty"
         for n in (1, 2):
@@ -385,25 +375,18 @@ def test_code_for_any_processor_gives_the_same_numbers(tmp_path: Path, monkeypat
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 @pytest.mark.parametrize("harm", ["cut", "empty", "junk", 0.0, 0.4, 0.7, 0.9999])
-def test_damaged_machine_code_is_compiled_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, harm: str | float
-) -> None:
+def test_damaged_machine_code_is_compiled_again(cache: Path, suffix: str, harm: str | float) -> None:
     """The file is cut, emptied, replaced, or has one bit flipped at a share of its length."""
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
-
-    def made() -> Kernel:
-        return Kernel(_doubled, (float64(float64),), "a test")
-
-    assert made()(2.0) == 4.0
-    (path,) = tmp_path.rglob(f"*.{suffix}")
+    assert _made(_doubled)(2.0) == 4.0
+    (path,) = cache.rglob(f"*.{suffix}")
     content = path.read_bytes()
     if isinstance(harm, float):
         path.write_bytes(flipped(content, harm))
     else:
         path.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "junk": b"junk" * 99}[harm])
     with pytest.warns(RuntimeWarning, match="is damaged .* it is compiled again"):
-        assert made()(2.0) == 4.0
-    assert made()(3.0) == 6.0  # from the cache, without a warning
+        assert _made(_doubled)(2.0) == 4.0
+    assert _made(_doubled)(3.0) == 6.0  # from the cache, without a warning
 
 
 def test_processes_that_find_the_same_damaged_code_all_go_on(tmp_path: Path) -> None:
@@ -425,8 +408,7 @@ print(Kernel(doubled, (float64(float64),), "a test")(2.0))
 """
 
 
-def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+def test_machine_code_of_functions_is_kept_and_checked(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[str] = []
 
     def noted(self: Any, *arguments: Any) -> None:
@@ -442,18 +424,18 @@ def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypat
 
     assert (value(3.0), value(3.0), len(written)) == (1.5, 1.5, 1)
     assert (value(4.0), len(written)) == (2.0, 2)
-    for path in (tmp_path / "llvm").iterdir():
+    for path in (cache / "llvm").iterdir():
         path.write_bytes(flipped(path.read_bytes(), 0.5))
     assert (value(3.0), value(4.0), value(3.0), len(written)) == (1.5, 2.0, 1.5, 4)
 
 
-def test_what_cannot_be_compiled_is_an_error_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+@pytest.mark.usefixtures("cache")
+def test_what_cannot_be_compiled_is_an_error_all_the_same() -> None:
     with pytest.raises(Exception, match=r"Cannot unify|No implementation"):
-        _ = Kernel(_mistyped, (float64(float64),), "a test").compiled
+        _ = _made(_mistyped).compiled
 
 
-def _mistyped(x):  # type: ignore[no-untyped-def]
+def _mistyped(x):
     return x + "x"
 
 
@@ -473,18 +455,9 @@ def _mistyped(x):  # type: ignore[no-untyped-def]
         ("folder", 0o702, False),
     ],
 )
-def test_code_is_kept_only_where_nobody_else_can_write(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    place: str,
-    mode: int,
-    trusted: bool,
-) -> None:
-    root = tmp_path / "above" / "root"
+def test_code_is_kept_only_where_nobody_else_can_write(cache, monkeypatch, capsys, place, mode, trusted) -> None:
+    root = cache / "root"
     monkeypatch.setenv("LINKWORK_CACHE_DIR", str(root))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
     folder = code_folder("kept")
     assert folder == root / "kept"
     {"above": root.parent, "root": root, "folder": folder}[place].chmod(mode)
@@ -498,8 +471,8 @@ def test_code_is_kept_only_where_nobody_else_can_write(
 
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
 @pytest.mark.parametrize("what", ["folder", "file", "above"])
-def test_code_of_another_user_is_not_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
-    root = tmp_path / "above" / "root"
+def test_code_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    root = cache / "root"
     monkeypatch.setenv("LINKWORK_CACHE_DIR", str(root))
     folder = code_folder("kept")
     (folder / "planted.nbi").touch()
@@ -509,13 +482,8 @@ def test_code_of_another_user_is_not_loaded(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
-def test_temporary_folder_that_others_can_write_to_is_not_trusted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    blocked = tmp_path / "blocked"
-    blocked.touch()
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(blocked))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+def test_temporary_folder_that_others_can_write_to_is_not_trusted(cache: Path) -> None:
+    cache.touch()
     shared = code_folder("b").parent
     assert not stat.S_IMODE(shared.stat().st_mode) & 0o022
     shared.chmod(0o777)
@@ -524,9 +492,8 @@ def test_temporary_folder_that_others_can_write_to_is_not_trusted(
     assert not other.is_relative_to(shared)
 
 
-def test_on_a_full_disk_code_is_compiled_and_not_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.usefixtures("cache")
+def test_on_a_full_disk_code_is_compiled_and_not_kept(monkeypatch: Any, capsys: Any) -> None:
     plain = Kernel._compile
 
     def full(self: Kernel, folder: Path | None) -> Any:
@@ -534,7 +501,6 @@ def test_on_a_full_disk_code_is_compiled_and_not_kept(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return plain(self, folder)
 
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(Kernel, "_compile", full)
     assert kernel(float64(float64), purpose="a test")(_doubled)(2.0) == 4.0
     assert "No space left on device: compiled code is not kept" in capsys.readouterr().err
@@ -552,5 +518,5 @@ def test_a_folder_on_a_full_disk_is_not_used(tmp_path: Path, monkeypatch: pytest
     assert "full" not in code_folder("kept").relative_to(tmp_path).parts
 
 
-def _doubled(x):  # type: ignore[no-untyped-def]
+def _doubled(x):
     return 2.0 * x

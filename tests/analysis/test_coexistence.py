@@ -1,7 +1,7 @@
 """Coexisting motions over a plane, and which of them a start ends in."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -10,29 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from click.testing import Result
 
-from analysis import Inputs, simulate
-from analysis.cli import main
+from analysis import Inputs, Trajectory, periodic, simulate
 from analysis.figures import plot
 from analysis.linkages import linkage
 from analysis.numerics.continuation import ContinuationError
-from analysis.periodic import (
-    Basins,
-    Coexistence,
-    Crossing,
-    Drive,
-    GridInterrupted,
-    Stability,
-    basins,
-    coexistence,
-    find_orbits,
-    frequency_response,
-    newton_orbit,
-    plane,
-    stability_chart,
-    with_isolas,
-)
+from analysis.periodic import Basins, Drive, basins, coexistence, find_orbits, frequency_response, plane, with_isolas
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import kernels
 from analysis.periodic.chart.boundary import line_branches
@@ -40,13 +24,21 @@ from analysis.periodic.chart.grid import grid_points
 from analysis.periodic.chart.kernels import Motions, Points
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, ParameterError
-from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import SETS
 
 #: The module, whose name in the package is that of its function.
 coexistences = import_module("analysis.periodic.chart.coexistence")
 RIG_1_B = SETS["rig-1-spring-b"].parameters
 SPEED = 1000.0 * RAD_S_PER_RPM
+OPERATION = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
+
+
+def run_from(rig: FiveBarParameters, speed: float, start: Sequence[float], turns: Any) -> Trajectory:
+    """Run from a position and a velocity of the slider; samples at numbers of turns."""
+    initial = InitialState(slider_position=float(start[0]), slider_velocity=float(start[1]))
+    times = 2.0 * np.pi / speed * np.array(turns)
+    return simulate(rig, Inputs(speed=speed), initial=initial, stop_time=times[-1], samples=times)
 
 
 @pytest.fixture(scope="module")
@@ -59,20 +51,17 @@ def test_texts_with_units_are_the_numbers(picture: Basins) -> None:
     same = basins(RIG_1_B, Drive(speed=SPEED), points=9, **texts)
     np.testing.assert_array_equal(same.position, picture.position)
     np.testing.assert_array_equal(same.ends, picture.ends)
-    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
-    found = coexistence(operation, ["1000 rpm"], "11 N.s/m")
+    found = coexistence(OPERATION, ["1000 rpm"], "11 N.s/m")
     assert (found.x, found.y) == (pytest.approx([SPEED]), pytest.approx([11.0]))
     with pytest.raises(ParameterError, match=r"drive\.speed is '300 mm'"):
-        coexistence(operation, ["300 mm"], [11.0])
+        coexistence(OPERATION, ["300 mm"], [11.0])
     with pytest.raises(InputError, match=r"the axis x of a grid is \['300 rpm'\]"):
-        coexistence(lambda x, y: operation(x, y), ["300 rpm"], [11.0])
+        coexistence(lambda x, y: OPERATION(x, y), ["300 rpm"], [11.0])
 
 
 def test_every_point_has_the_motions_that_are_found_there_alone() -> None:
     rpm = np.array([900.0, 1000.0, 1100.0])
-    found = coexistence(
-        plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), rpm * RAD_S_PER_RPM, [11.0]
-    )
+    found = coexistence(OPERATION, rpm * RAD_S_PER_RPM, [11.0])
     for column, speed in enumerate(rpm * RAD_S_PER_RPM):
         alone = find_orbits(replace(RIG_1_B, slider_damping=11.0), speed=float(speed))
         assert found.count[0, column] == len(alone)
@@ -85,18 +74,9 @@ def test_every_point_has_the_motions_that_are_found_there_alone() -> None:
 
 def test_a_start_ends_where_a_long_run_does(picture: Basins) -> None:
     """By the solver of runs, 300 turns from starts of each kind, but for those at the limit of assembly."""
-    period = 2.0 * np.pi / SPEED
     for end in (0, 1):
         row, column = np.argwhere(picture.ends == end)[3]
-        run = simulate(
-            RIG_1_B,
-            Inputs(speed=SPEED),
-            initial=InitialState(
-                slider_position=float(picture.position[column]), slider_velocity=float(picture.rate[row])
-            ),
-            stop_time=300 * period,
-            samples=[0.0, 300 * period],
-        )
+        run = run_from(RIG_1_B, SPEED, (picture.position[column], picture.rate[row]), [0.0, 300.0])
         last = run["slider.position"][-1], run["slider.velocity"][-1]
         assert last == pytest.approx(picture.motions[end].start.tolist(), abs=1e-3)
 
@@ -111,9 +91,8 @@ def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     assert plot(picture.found).axes
 
 
-def motions(folder: Path, damping: float = 11.0) -> Coexistence:
-    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
-    return coexistence(operation, [SPEED], [damping, 12.0, 13.0], folder=folder)
+def motions(folder: Path, damping: float = 11.0) -> periodic.Coexistence:
+    return coexistence(OPERATION, [SPEED], [damping, 12.0, 13.0], folder=folder)
 
 
 def ends(folder: Path, damping: float = 11.0) -> Basins:
@@ -137,7 +116,7 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
 
     monkeypatch.setattr(coexistences, work, interrupted)
     monkeypatch.setattr(coexistences, "_TOGETHER", 1)
-    with pytest.raises(GridInterrupted, match=r"2 of 3 rows done, which are kept in .*: call again to go on"):
+    with pytest.raises(periodic.GridInterrupted, match=r"2 of 3 rows done, which are kept in .*: call again to go on"):
         of(tmp_path)
     monkeypatch.setattr(coexistences, work, compute)
     last = of(tmp_path)
@@ -152,9 +131,7 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
         np.testing.assert_array_equal(*(np.ma.filled(getattr(found, name, 0), np.nan) for found in (last, alone)))
 
 
-def test_a_motion_missing_at_a_point_is_sought_from_those_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_motion_missing_at_a_point_is_sought_from_those_beside_it(tmp_path, monkeypatch) -> None:
     compute = coexistences._compute_motions
 
     def losing(*arguments: Any) -> Any:
@@ -165,8 +142,7 @@ def test_a_motion_missing_at_a_point_is_sought_from_those_beside_it(
 
     monkeypatch.setattr(coexistences, "_compute_motions", losing)
     monkeypatch.setattr(coexistences, "_TOGETHER", 1)
-    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
-    found = coexistence(operation, [0.99 * SPEED, SPEED, 1.01 * SPEED], [11.0], folder=tmp_path)
+    found = coexistence(OPERATION, [0.99 * SPEED, SPEED, 1.01 * SPEED], [11.0], folder=tmp_path)
     assert found.count.tolist() == [[3, 3, 3]]
     assert found.index.tolist() == [[1, 1, 1]]
     alone = find_orbits(replace(RIG_1_B, slider_damping=11.0), speed=SPEED)
@@ -181,7 +157,7 @@ def test_no_stable_motion_is_a_sentence() -> None:
     with pytest.raises(InputError, match=r"range of the rate is 1.* to 0"):
         basins(RIG_1_B, Drive(speed=SPEED), points=2, rate=(1.0, 0.0))
     with pytest.raises(InputError, match="axis x"):
-        coexistence(plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), [], [1.0])
+        coexistence(OPERATION, [], [1.0])
 
 
 LIGHT = replace(RIG_1_B, slider_damping=2.0)
@@ -196,14 +172,7 @@ def test_a_start_ends_in_a_motion_of_four_turns() -> None:
     assert [orbit.turns for orbit in near.motions] == [1, 4]
     assert near.motions[0].start == pytest.approx(simple.start, rel=1e-8)
     assert (near.ends == 1).all()
-    period = 2.0 * np.pi / SUBHARMONIC
-    run = simulate(
-        LIGHT,
-        Inputs(speed=SUBHARMONIC),
-        initial=InitialState(slider_position=beside[0][0], slider_velocity=beside[1][0]),
-        stop_time=204 * period,
-        samples=np.append(0.0, np.arange(200, 205)) * period,
-    )
+    run = run_from(LIGHT, SUBHARMONIC, (beside[0][0], beside[1][0]), [0, *range(200, 205)])
     last = run["slider.position"][1:]
     assert last[4] == pytest.approx(last[0], abs=1e-5)
     assert np.abs(last[1:4] - last[0]).min() > 1e-3
@@ -249,8 +218,8 @@ def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_t
     response = frequency_response(LIGHT, low, high, doublings=0, greatest_step=2e-2)
     whole = with_isolas(response, places=1, turns=4, greatest_step=2e-2)
     (branch,) = (branch for branch in whole.branches if branch.turns == 4)
-    stable = branch.parameter[[word is Stability.STABLE for word in branch.stability()]]
-    assert [special.kind for special in branch.special] == [Crossing.FOLD, Crossing.PERIOD_DOUBLING]
+    stable = branch.parameter[[word is periodic.Stability.STABLE for word in branch.stability()]]
+    assert [special.kind for special in branch.special] == [periodic.Crossing.FOLD, periodic.Crossing.PERIOD_DOUBLING]
     fold, doubling = (special.parameter for special in branch.special)
     assert doubling < stable.min() < SUBHARMONIC < stable.max() < fold < doubling + 13.0 * RAD_S_PER_RPM
     # beyond the fold there is none, within it there is
@@ -292,23 +261,14 @@ def test_an_isola_is_found_that_the_branch_from_the_ends_does_not_pass() -> None
     assert through.special == ()
     # the motions of a line's ends are all on the branch that passes
     assert found.count[0, [0, -1]].tolist() == [1, 1]
-    folds = sorted(special.parameter for special in isola.special if special.kind is Crossing.FOLD)
+    folds = sorted(special.parameter for special in isola.special if special.kind is periodic.Crossing.FOLD)
     assert len(folds) == 2
     assert low < folds[0] < folds[1] < high
     # what is stable on it stays there in a run by the solver of runs; from rest the mechanism settles on the other branch
-    stable = next(o for o in isola.orbits if o.verdict().stability is Stability.STABLE and o.amplitude > 0.1)
-    assert stable.drive.speed is not None
-    period = 2.0 * np.pi / stable.drive.speed
-    turn = 300 * period + np.linspace(0.0, period, 200)
+    stable = next(o for o in isola.orbits if o.verdict().stability is periodic.Stability.STABLE and o.amplitude > 0.1)
     swings = []
-    for position, velocity in (stable.start.tolist(), (0.0, 0.0)):
-        run = simulate(
-            rig,
-            Inputs(speed=stable.drive.speed),
-            initial=InitialState(slider_position=position, slider_velocity=velocity),
-            stop_time=301 * period,
-            samples=[0.0, *turn],
-        )
+    for start in (stable.start, (0.0, 0.0)):
+        run = run_from(rig, stable.drive.speed, start, [0.0, *np.linspace(300.0, 301.0, 200)])
         swings.append(0.5 * np.ptp(run["slider.position"][1:]))
     assert swings[0] == pytest.approx(stable.amplitude, rel=1e-3)
     assert swings[1] < 0.5 * swings[0]
@@ -321,7 +281,7 @@ def test_a_part_with_stable_motions_that_no_line_meets_gets_a_line() -> None:
     largest[..., 1] = np.nan
     largest[3:5, 3:6, 1] = 0.9
     masked = np.ma.masked_invalid(largest)
-    beside = Coexistence(
+    beside = periodic.Coexistence(
         x=axis,
         y=axis,
         largest=masked,
@@ -349,10 +309,9 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
-    chart = stability_chart(
+    chart = periodic.stability_chart(
         "rig-1-spring-b", ranges=(("990 rpm", "1010 rpm"), ("10 N.s/m", "12 N.s/m")), points=3, coexisting=True
     )
-    assert chart.beside is not None
     assert (chart.beside.stable == 2).all()
     assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider damping [N.s/m]"] * 3
     assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
@@ -362,27 +321,26 @@ def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
     """At small damping near resonance: 37 of 900 such points had no motion, one of them stable with 13.8 cm."""
-    chart = stability_chart("rig-1-spring-b", ranges=(("1060 rpm", "1090 rpm"), ("2 N.s/m", "3 N.s/m")), points=4)
+    chart = periodic.stability_chart(
+        "rig-1-spring-b", ranges=(("1060 rpm", "1090 rpm"), ("2 N.s/m", "3 N.s/m")), points=4
+    )
     assert chart.grid.largest.count() == 16
-    orbit = newton_orbit(replace(RIG_1_B, slider_damping=2.0), Drive(speed="1070 rpm"))
+    orbit = periodic.newton_orbit(replace(RIG_1_B, slider_damping=2.0), Drive(speed="1070 rpm"))
     assert chart.grid.largest[0, 1] == pytest.approx(orbit.largest, rel=1e-8)
 
 
 @pytest.mark.slow
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command(linkwork: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     search = import_module("analysis.periodic.motion.search")
     sought: list[int] = []
     ready = search.require_turns
     monkeypatch.setattr(search, "require_turns", lambda turns, *at: (sought.append(turns), ready(turns, *at)))
-    arguments = ["basins", "--published", "rig-1-spring-b", "--speed", "1000 rpm", "--points", "4", "--html"]
-    done = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path)])
-    assert done.exit_code == 0, done.output
+    done = linkwork("basins --published rig-1-spring-b --speed '1000 rpm' --points 4 --html --out .")
     assert sought == [1, 2, 3, 4]
     assert "two methods found the same motions" in done.output
     assert "of 16 starts end" in done.output
-    assert sorted(p.name for p in tmp_path.glob("rig*")) == [
-        f"rig-1-spring-b-basins.{kind}" for kind in ("csv", "html", "png")
-    ]
+    written = sorted(path.name for path in tmp_path.glob("rig*"))
+    assert written == [f"rig-1-spring-b-basins.{kind}" for kind in ("csv", "html", "png")]
     assert "ends in motion 1" in (tmp_path / "rig-1-spring-b-basins.html").read_text(encoding="utf-8")
 
 

@@ -90,10 +90,8 @@ def test_links_that_do_not_reach_between_the_nodes_are_no_motion_of_a_chart(tmp_
     rig = built.freedom("rotor", "P", speed=20.0).freedom("across", "rail").mechanism().first_set.parameters
     # travel^2 (stiffness - mass w^2)^2 + (travel damping w)^2 = (unbalance w^2)^2
     travel = reach * np.array([0.996, 0.998, 1.0004])
-    sizes = [
-        np.roots([(t * mass) ** 2 - unbalance**2, t**2 * (damping**2 - 2.0 * mass * stiffness), (t * stiffness) ** 2])
-        for t in travel
-    ]
+    middle = damping**2 - 2.0 * mass * stiffness
+    sizes = [np.roots([(t * mass) ** 2 - unbalance**2, t**2 * middle, (t * stiffness) ** 2]) for t in travel]
     speeds = np.sqrt([min(size) for size in sizes])
     found = grid(plane(rig, Drive(speed=20.0), "drive.speed", "spring.damping"), speeds, [4.0], folder=tmp_path)
     assert found.status.tolist() == [[Status.DONE, Status.DONE, Status.LIMIT]]

@@ -16,6 +16,8 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.limits import JAMMING
 from tests.strategies import PINS
 
+from .conftest import marked
+
 RIG = {spring: SETS[f"rig-1-spring-{spring}"].parameters for spring in "ab"}
 #: Steel on bronze in a dry guide, pins of 5 mm.
 ROUGH = {"slider_friction_coefficient": 0.2, **dict.fromkeys(PINS, 5e-4)}
@@ -23,16 +25,13 @@ JAMMED = replace(TABLE_3_1, slider_friction_coefficient=4.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("spring", "rpm"), [("a", 300.0), ("b", 580.0), pytest.param("b", 800.0, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize(("spring", "rpm"), [("a", 300.0), ("b", 580.0), *marked("long", [("b", 800.0)])])
 def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
     speed, parameters = rpm * RAD_S_PER_RPM, replace(RIG[spring], **ROUGH)
     orbit = find_orbit(parameters, speed=speed)
     assert orbit.verdict().stability is Stability.STABLE
-    run = simulate(
-        parameters, Inputs(speed=speed), stop_time=60.0 * 2.0 * pi / speed, step=2.0 * pi / speed, tolerance=1e-10
-    )
+    turn = 2.0 * pi / speed
+    run = simulate(parameters, Inputs(speed=speed), stop_time=60.0 * turn, step=turn, tolerance=1e-10)
     end = [run[name][-1] for name in ("slider.position", "slider.velocity")]
     assert end == pytest.approx(orbit.start, rel=1e-6, abs=1e-7)
     assert abs(run["energy.residual"][-1]) < 1e-7 * run["energy.dissipated"][-1]
@@ -41,10 +40,7 @@ def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("spring", "rpm"),
-    [("a", 240.0), ("b", 800.0), *(pytest.param(spring, 500.0, marks=pytest.mark.long) for spring in "ab")],
-)
+@pytest.mark.parametrize(("spring", "rpm"), [("a", 240.0), ("b", 800.0), *marked("long", [("a", 500.0), ("b", 500.0)])])
 def test_rig_1_does_not_jam_with_a_coefficient_of_a_half(spring: str, rpm: float) -> None:
     orbit = find_orbit(replace(RIG[spring], slider_friction_coefficient=0.5), speed=rpm * RAD_S_PER_RPM)
     assert orbit.clearance() > 0.5

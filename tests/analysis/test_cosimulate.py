@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 
 from analysis import CosimulationError, Inputs, Trajectory, compare, cosimulate, simulate
-from analysis.mechanisms import FIVE_BAR
+from analysis.mechanisms import FIVE_BAR, find_mechanism
+from analysis.run import CASES
 from analysis.units import CM_PER_METRE
 from linkwork.errors import InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests import published
 from tests.fmu.runner import run_in_process
+
+from .conftest import copied
 
 SPEED = SETS["table-3.1"].crank_speed
 
@@ -36,7 +39,7 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
     from linkwork.five_bar.parameters import InitialState
     from linkwork.five_bar.published import TABLE_3_1
 
-    def case(name: str) -> dict:  # type: ignore[type-arg]
+    def case(name: str) -> dict:
         common = {"stop_time": 0.2, "step": 1e-3}
         if name == "bar-and-load":
             point = replace(TABLE_3_1, coupler_point_distance=0.1, coupler_point_angle=0.4, slider_coulomb_friction=2.0)
@@ -57,14 +60,8 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
             inputs = Inputs(speed=Harmonics(40.0, [3.0], [30.0], [0.0]), force=steps([0.0, 5.1], [0.0, 4.0]))
             times = {"start_time": 5.0, "stop_time": 5.2005, "step": 1e-3}
             return {"parameters": TABLE_3_1, "inputs": inputs, "initial": initial, **times}
-        chosen = CASES[name]
-        return {
-            "parameters": chosen.parameters,
-            "inputs": chosen.inputs,
-            "initial": chosen.initial,
-            "stop_time": 0.4,
-            "step": chosen.step,
-        }
+        kept = {key: getattr(CASES[name], key) for key in ("parameters", "inputs", "initial", "step")}
+        return kept | {"stop_time": 0.4}
 
     results = []
     for name in names:
@@ -77,25 +74,9 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
     return results
 
 
-#: Every case that the issue names, and what joins several of them.
-CASE_NAMES = [
-    "constant-speed",
-    "speed-ramp",
-    "speed-jump",
-    "torque-switched-off",
-    "induction-motor",
-    "control-force",
-    "load",
-    "inclined-guide",
-    "table-3.1",
-    "other-assembly",
-    "coulomb-friction",
-    "contact-friction",
-    "bar-and-load",
-    "ramp-and-jump",
-    "functions-of-the-state",
-    "late-start",
-]
+#: Every standard case of the five-bar, and what joins several of them.
+CASE_NAMES = [name for name, case in CASES.items() if find_mechanism(case.parameters) is FIVE_BAR]
+CASE_NAMES += ["bar-and-load", "ramp-and-jump", "functions-of-the-state", "late-start"]
 
 
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
@@ -121,10 +102,8 @@ def _check_random_mechanisms(fmu: str, root: str, count: int) -> dict[str, Any]:
 
     def waves(source: random.Random, mean: float, size: float) -> Harmonics:
         n = source.randint(1, 3)
-        amplitudes, frequencies, phases = (
-            [source.uniform(low, high) for _ in range(n)] for low, high in ((-size, size), (5.0, 100.0), (0.0, 6.3))
-        )
-        return Harmonics(mean, amplitudes, frequencies, phases)
+        ranges = ((-size, size), (5.0, 100.0), (0.0, 6.3))
+        return Harmonics(mean, *([source.uniform(*each) for _ in range(n)] for each in ranges))
 
     worst: list[Any] = []
     ended: list[Any] = []
@@ -132,11 +111,7 @@ def _check_random_mechanisms(fmu: str, root: str, count: int) -> dict[str, Any]:
         case = seeded(seed)
         source = random.Random(seed)
         held = case.torque_inputs
-        acting = {
-            "force": waves(source, held.force, 10.0),
-            "load_x": waves(source, held.load_x, 10.0),
-            "load_y": waves(source, held.load_y, 10.0),
-        }
+        acting = {name: waves(source, getattr(held, name), 10.0) for name in ("force", "load_x", "load_y")}
         speed = seed % 2 == 1
         # torques in proportion to the crank's inertia: a light one at thousands of rad/s is a matter of rounding
         inertia = case.parameters.constants().i2b
@@ -238,7 +213,7 @@ def _runs(fmu: str) -> dict[str, Any]:
     jump = cosimulate(fmu, TABLE_3_1, Inputs(torque=steps([0.0, 0.3], [0.1, 0.7])), stop_time=0.5, step=0.1)
     found["jump"] = jump["drive.applied_torque"].tolist()
     found["statistics"] = [jump.statistics["steps"], jump.source]
-    return json.loads(json.dumps(found, default=float))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(found, default=float))
 
 
 @pytest.fixture(scope="module")
@@ -345,13 +320,9 @@ def test_foreign_fmu(tmp_path: Path, interface: str) -> None:
 
 
 def test_fmu_without_a_library_for_this_platform(fmu: Path, tmp_path: Path) -> None:
-    path = tmp_path / "stripped.fmu"
-    with zipfile.ZipFile(fmu) as whole, zipfile.ZipFile(path, "w") as stripped:
-        for name in whole.namelist():
-            if not name.startswith("binaries/"):
-                stripped.writestr(name, whole.read(name))
+    stripped = copied(fmu, tmp_path / "stripped.fmu", lambda name, content: None if "binaries/" in name else content)
     with pytest.raises(CosimulationError, match=r"stripped\.fmu: Cannot find shared library"):
-        _cosimulate(path)
+        _cosimulate(stripped)
 
 
 # --- Comparing

@@ -66,9 +66,8 @@ def test_beyond_the_greatest_friction_of_the_curve_the_branch_from_below_has_no_
 
 def test_a_doubling_moves_with_the_damping() -> None:
     doubling = next(s for s in specials(RIG_1_B, SPEEDS[1], -1) if s.kind is Crossing.PERIOD_DOUBLING)
-    curve = follow_crossing(
-        with_damping, doubling.orbit, doubling.kind, (doubling.parameter, 9.0), x=SPEEDS, y=(5.0, 14.0)
-    )
+    place, ends = (doubling.parameter, 9.0), {"x": SPEEDS, "y": (5.0, 14.0)}
+    curve = follow_crossing(with_damping, doubling.orbit, doubling.kind, place, **ends)
     assert all(np.abs(orbit.multipliers + 1.0).min() < 1e-6 for orbit in curve.orbits)
     order = np.argsort(curve.points[:, 1])
     for damping in (6.0, 8.0):

@@ -74,10 +74,17 @@ def test_powers() -> None:
     assert on_this_processor("pow", bases, powers) == pytest.approx([-8.0, 0.25, math.nan, 0, 1, 1, 0.2], nan_ok=True)
 
 
-@pytest.fixture
-def without_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """CuPy without a device: this processor runs the same kernel."""
+@pytest.fixture(autouse=True)
+def fresh_solver() -> Iterator[None]:
+    """No solver on a device is kept from another test."""
     on_device.solver.cache_clear()
+    yield
+    on_device.solver.cache_clear()
+
+
+@pytest.fixture
+def without_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CuPy without a device: this processor runs the same kernel."""
     cuda = device.Cuda
 
     def make(function: Any, equations: Any) -> device.Cuda:
@@ -86,11 +93,16 @@ def without_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         return cuda(function, equations)
 
     monkeypatch.setattr(device, "Cuda", make)
-    yield
-    on_device.solver.cache_clear()
+
+
+def softer(**options: Any) -> Any:
+    """Runs of Table 3.1 with several springs, on a device unless another is given."""
+    return simulate_many(TABLE_3_1, vary=SOFTER, **{"stop_time": 0.1, "device": "cuda"} | options)
 
 
 SOFTER = {"slider.stiffness": np.linspace(700.0, 1300.0, 9)}
+MOTOR = InductionMotor(breakdown_torque=10.0, breakdown_slip=0.3, synchronous_speed=60.0)
+FRICTION = {"slider.coulomb_friction": np.linspace(0.5, 3.0, 5)}
 SPEED = ramp(40.0, 55.0, 0.1, 0.3)
 FORCE = table([0.0, 0.1, 0.2, 0.4], [0.0, 20.0, -10.0, 5.0], kind="cubic")
 DAMPED = [replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=damping) for damping in (8.0, 10.0, 300.0)]
@@ -100,16 +112,9 @@ CASES: dict[str, dict[str, Any]] = {
     "ramp and harmonics": {"inputs": Inputs(speed=SPEED, force=Harmonics(5.0, [20.0], [30.0], [0.4])), "vary": SOFTER},
     "torque and table": {"inputs": Inputs(torque=0.3, force=FORCE), "vary": SOFTER},
     "torsion bar": {"inputs": Inputs(torque=TorsionBar(torque=10.0)), "vary": SOFTER},
-    "motor": {
-        "inputs": Inputs(torque=InductionMotor(breakdown_torque=10.0, breakdown_slip=0.3, synchronous_speed=60.0)),
-        "vary": SOFTER,
-    },
+    "motor": {"inputs": Inputs(torque=MOTOR), "vary": SOFTER},
     "held": {"inputs": Inputs(speed=SPEED, force=FORCE), "vary": SOFTER, "hold": 1e-3},
-    "friction": {
-        "tolerance": 1e-11,
-        "inputs": Inputs(speed=43.98),
-        "vary": {"slider.coulomb_friction": np.linspace(0.5, 3.0, 5)},
-    },
+    "friction": {"inputs": Inputs(speed=43.98), "vary": FRICTION, "tolerance": 1e-11},
     "to the limit": {"parameters": DAMPED, "inputs": Inputs(speed=43.98), "stop_time": 0.6},
     "slider-crank": {"parameters": "rahman-ideal", "vary": {"rod.mass": np.linspace(0.5, 1.5, 5)}},
     "own linkage": {"vary": {"across.stiffness": np.linspace(1e5, 3e5, 5)}},
@@ -137,9 +142,9 @@ def test_runs_are_those_of_the_processor(case: str) -> None:
 
 @pytest.mark.usefixtures("without_device")
 def test_runs_of_many_steps_go_on_and_those_that_cannot_start_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.3, device="cuda")
+    whole = softer(stop_time=0.3)
     monkeypatch.setattr(on_device, "STEPS_PER_LAUNCH", 3)
-    parts = simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.3, device="cuda", batch=2)
+    parts = softer(stop_time=0.3, batch=2)
     assert np.array_equal(whole.states, parts.states)
     apart = replace(TABLE_3_1, rocker_length=0.01)
     some = simulate_many([TABLE_3_1, apart], stop_time=0.1, device="cuda")
@@ -149,7 +154,7 @@ def test_runs_of_many_steps_go_on_and_those_that_cannot_start_are_left(monkeypat
 @pytest.mark.usefixtures("without_device")
 def test_results_of_a_device_are_kept_apart(tmp_path: Path) -> None:
     for which in ("cuda", None, "cuda"):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, folder=tmp_path, device=which)
+        softer(folder=tmp_path, device=which)
     assert len(list(tmp_path.glob("*.runs"))) == 2
 
 
@@ -158,37 +163,38 @@ def test_results_of_a_device_are_kept_apart(tmp_path: Path) -> None:
     [
         ({"device": "opencl"}, "device is 'opencl': it must be 'cuda', or left out"),
         ({"device": "cuda", "n_jobs": 2}, "n_jobs is 2: with a device"),
-        (
-            {"device": "cuda", "inputs": Inputs(speed=44.0, force=Function(lambda t, *x: 0.0))},
-            "Python functions cannot",
-        ),
+        ({"device": "cuda", "inputs": Inputs(force=Function(lambda t, *x: 0.0))}, "Python functions cannot"),
     ],
 )
 def test_what_does_not_fit_a_device_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, **options)
+        softer(**options)
 
 
-def test_no_library_no_device_and_its_errors_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    on_device.solver.cache_clear()
-    monkeypatch.setitem(sys.modules, "cupy", None)
-    with pytest.raises(MissingLibraryError, match=r"cupy-cuda12x.*'cuda'"):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
-    monkeypatch.setitem(sys.modules, "cupy", none.cupy(None, available=False))
-    with pytest.raises(LinkworkError, match="no graphics processor"):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
-    without_memory = none.cupy(None)
-    monkeypatch.setattr(without_memory, "asarray", lambda array: (_ for _ in ()).throw(none.Error("out of memory")))
-    monkeypatch.setitem(sys.modules, "cupy", without_memory)
-    with pytest.raises(LinkworkError, match=r"failed \(out of memory\): .* a smaller batch"):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
-    on_device.solver.cache_clear()
-    old = none.cupy(None)
-    monkeypatch.setattr(old, "RawModule", lambda path: (_ for _ in ()).throw(none.Error("no kernel image")))
-    monkeypatch.setitem(sys.modules, "cupy", old)
-    with pytest.raises(LinkworkError, match=r"failed \(no kernel image\): it must be from 2018 or later"):
-        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
-    on_device.solver.cache_clear()
+def failing(name: str, said: str) -> Any:
+    """CuPy of which a function fails."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise none.Error(said)
+
+    made = none.cupy(None)
+    setattr(made, name, fail)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("cupy", "error", "said"),
+    [
+        (None, MissingLibraryError, r"cupy-cuda12x.*'cuda'"),
+        (none.cupy(None, available=False), LinkworkError, "no graphics processor"),
+        (failing("asarray", "out of memory"), LinkworkError, r"failed \(out of memory\): .* a smaller batch"),
+        (failing("RawModule", "no kernel image"), LinkworkError, r"\(no kernel image\): it must be from 2018 or later"),
+    ],
+)
+def test_no_library_no_device_and_its_errors_are_told(monkeypatch: Any, cupy: Any, error: Any, said: str) -> None:
+    monkeypatch.setitem(sys.modules, "cupy", cupy)
+    with pytest.raises(error, match=said):
+        softer()
 
 
 def test_nvidias_assembler_takes_the_code(tmp_path: Path) -> None:
@@ -210,10 +216,8 @@ def test_a_device_has_the_bits_of_this_processor(monkeypatch: pytest.MonkeyPatch
     cupy = pytest.importorskip("cupy", reason="CuPy is not installed")
     if not cupy.cuda.is_available():
         pytest.skip("there is no device")
-    on_device.solver.cache_clear()
-    theirs = simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.4, device="cuda")
+    theirs = softer(stop_time=0.4)
     on_device.solver.cache_clear()
     kernel, functions = device.compile_kernel(on_device.run_thread), run_functions(FIVE_BAR)
     monkeypatch.setitem(sys.modules, "cupy", none.cupy(none.Processor(kernel, functions)))
-    assert np.array_equal(theirs.states, simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.4, device="cuda").states)
-    on_device.solver.cache_clear()
+    assert np.array_equal(theirs.states, softer(stop_time=0.4).states)

@@ -58,12 +58,8 @@ def labels_of(figure: figures.Figure) -> list[str]:
 def test_a_run_has_its_mechanism_beside_and_no_panel_for_a_constant(run) -> None:
     figure = figures.plot(run, title="driven at a speed")
     *curves, forces, mechanism = figure.axes
-    assert labels_of(figure) == [
-        "slider position [mm]",
-        "drive applied torque [N.m]",
-        "transmission angle [deg]",
-        "pin forces [N]",
-    ]
+    labels = ["slider position [mm]", "drive applied torque [N.m]", "transmission angle [deg]", "pin forces [N]"]
+    assert labels_of(figure) == labels
     assert figure.get_supxlabel() == "Constant, not drawn: crank speed 420.2 rpm."
     np.testing.assert_allclose(curves[-1].lines[0].get_ydata(), np.degrees(run["transmission.angle"]), rtol=1e-12)
     magnitude = {line.get_label(): line.get_ydata() for line in forces.lines}
@@ -165,9 +161,8 @@ def test_a_run_that_ended_early_says_why_and_its_texts_cover_nothing(run) -> Non
     figure = figures.plot(replace(run, status=3, message="limit of assembly at t = 1 s"), title="a run")
     assert figure.get_supxlabel().splitlines()[-1] == "The run ended early: limit of assembly at t = 1 s."
     for axis in figure.axes[:-1]:
-        boxes = [
-            text.get_window_extent() for text in (axis.yaxis.label, axis.xaxis.label, *axis.texts) if text.get_text()
-        ]
+        texts = (axis.yaxis.label, axis.xaxis.label, *axis.texts)
+        boxes = [text.get_window_extent() for text in texts if text.get_text()]
         legend = axis.get_legend()
         stand_clear(axis, boxes + ([legend.get_window_extent()] if legend else []))
 
@@ -202,10 +197,9 @@ def test_the_drive_of_a_slider_is_over_the_rotation_of_a_crank_that_turns_either
 
 
 def test_outputs_to_plot_are_a_list(run) -> None:
-    with pytest.raises(InputError, match=r"such as \['slider.position'\]"):
-        figures.plot(run, "slider.position")
-    with pytest.raises(InputError, match=r"such as \['slider.position'\]"):
-        figures.plot(simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.01), "slider.position")
+    for result in (run, simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.01)):
+        with pytest.raises(InputError, match=r"such as \['slider.position'\]"):
+            figures.plot(result, "slider.position")
 
 
 def test_comparison(run) -> None:
@@ -217,9 +211,7 @@ def test_comparison(run) -> None:
     assert (both.get_ylabel(), difference.get_ylabel()) == ("slider position\n[mm]", "difference\n[mm]")
 
 
-@pytest.mark.parametrize(
-    ("factor", "said"), [(1.0, "are identical"), (1.0 + 1e-14, "rounding only: slider position by"), (1.0 + 1e-11, "")]
-)
+@pytest.mark.parametrize(("factor", "said"), [(1.0, "identical"), (1.0 + 1e-14, "rounding only"), (1.0 + 1e-11, "")])
 def test_there_is_a_column_of_differences_only_where_there_is_one(run, factor: float, said: str) -> None:
     figure = figures.plot_comparison(run, replace(run, values=factor * run.values), ["slider.position"])
     assert len(figure.axes) == (1 if said else 2)
@@ -230,9 +222,8 @@ def test_there_is_a_column_of_differences_only_where_there_is_one(run, factor: f
 @pytest.mark.parametrize(("greatest", "there"), [(6.0, {"0.5", "1", "2", "5"}), (600.0, set())])
 def test_few_decades_have_plain_numbers(greatest: float, there: set[str]) -> None:
     curve = figures.Curve(x=np.array([0.45, greatest]), y=np.array([1.0, 2.0]))
-    (axis,) = figures.plot_curves(
-        [figures.Panel(x_label="x", y_label="y", curves=[curve], logarithmic="x")], title=""
-    ).axes
+    panel = Panel(x_label="x", y_label="y", curves=[curve], logarithmic="x")
+    (axis,) = figures.plot_curves([panel], title="").axes
     assert (axis.get_xscale(), axis.get_yscale()) == ("log", "linear")
     assert there == {label.get_text() for label in axis.get_xticklabels()} & {"0.5", "1", "2", "5"}
     assert not any(label.get_text() for label in axis.get_xticklabels(minor=True))
@@ -267,9 +258,8 @@ def test_curves() -> None:
 def test_names_of_places_cover_no_curve(height: float) -> None:
     x = np.linspace(0.0, 10.0, 200)
     curves = [Curve(x=x, y=height + 0.04 * np.sin(3.0 * x), label="wave"), Curve(x=[0.0, 10.0], y=[0.0, 1.0])]
-    panel = Panel(
-        x_label="x", y_label="y", curves=curves, verticals={"first place": 3.0, "second place": 3.4, "end": 9.9}
-    )
+    verticals = {"first place": 3.0, "second place": 3.4, "end": 9.9}
+    panel = Panel(x_label="x", y_label="y", curves=curves, verticals=verticals)
     axis = figures.plot_curves([panel], title="", size=(6.4, 3.7)).axes[0]
     boxes = [text.get_window_extent() for text in axis.texts]
     assert len(boxes) == 3
@@ -413,9 +403,7 @@ def test_a_legend_has_room_above_curves_that_leave_it_none() -> None:
 
 def test_ticks_that_touch_are_thinned_at_the_size_that_is_shown() -> None:
     x = np.linspace(0.0, 360.0, 9)
-    panel = Panel(
-        x_label="angle [deg]", y_label="y", curves=[Curve(x=x, y=x)], x_ticks=x.tolist(), verticals={"p": 90.0}
-    )
+    panel = Panel(x_label="x [deg]", y_label="y", curves=[Curve(x=x, y=x)], x_ticks=x.tolist(), verticals={"p": 90.0})
     figure = figures.plot_curves([panel] * 3, title="t", columns=3)
 
     def ticks(axis):

@@ -16,29 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.files import (
-    Choice,
-    Kinds,
-    Many,
-    Quantity,
-    Range,
-    Table,
-    Whole,
-    entry,
-    entry_names,
-    flag,
-    load_array,
-    override,
-    read,
-    read_record,
-    read_rows,
-    reader,
-    save_array,
-    tables,
-    text,
-    unknown_name,
-    write_csv,
-)
+from analysis import files
+from analysis.files import Many, Quantity, Table, entry, load_array, read, read_record, tables, text, write_csv
 from analysis.units import quantity, with_unit
 from linkwork.errors import InputError, Interrupted, MissingParameterError, ParameterError, UnknownNameError
 
@@ -99,7 +78,7 @@ def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "right"), [("2 Kg", "kg", "kg"), ("9 rots", "rad/s", "rpm"), ("2 kg", "m", "mm")]
+    ("text", "unit", "right"), [("2 Kg", "kg", "kg"), ("9 rots", "rad/s", "rpm"), ("2 g", "m", "mm")]
 )
 def test_a_wrong_unit_is_answered_with_right_ones(text, unit, right):
     with pytest.raises(ParameterError, match=rf"such as .*\b{right}\b"):
@@ -151,7 +130,7 @@ def test_a_number_without_a_unit_may_be_in_one():
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pin:
     at: tuple[float, float] = entry(Many(Quantity("m", bare="mm"), length=2))
-    fixed: bool = entry(flag, False)
+    fixed: bool = entry(files.flag, False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,11 +138,11 @@ class Bar:
     length: float = entry(Quantity("m", above=0.0))
     play: float = entry(Quantity("m", least=0.0), 0.0)
     begin: float = entry(Quantity("rad", least=-1.0, below=7.0), 0.0, key="from")
-    holes: int = entry(Whole(1), 2)
-    material: str = entry(Choice(("steel", "brass")), "steel")
-    tilt: tuple[float, float] = entry(Range(Quantity("rad")), (0.0, 0.0))
+    holes: int = entry(files.Whole(1), 2)
+    material: str = entry(files.Choice(("steel", "brass")), "steel")
+    tilt: tuple[float, float] = entry(files.Range(Quantity("rad")), (0.0, 0.0))
     pins: tuple[Pin, ...] = entry(Many(Table(Pin), least=1, single=True), ())
-    end: Any = entry(Kinds({"round": Table(dict, {"radius": Quantity("m")}), "flat": Table(dict)}), None)
+    end: Any = entry(files.Kinds({"round": Table(dict, {"radius": Quantity("m")}), "flat": Table(dict)}), None)
     name: str = entry(text, "")
 
 
@@ -178,12 +157,11 @@ def test_a_table_becomes_a_dataclass():
         "name": 7,
     }
     end = {"radius": 1.0}
-    made = Bar(
-        length=0.02, begin=pi, material="brass", tilt=(0.5, 0.5), pins=(Pin(at=(0.001, 2.0)),), end=end, name="7"
-    )
+    pins = (Pin(at=(0.001, 2.0)),)
+    made = Bar(length=0.02, begin=pi, material="brass", tilt=(0.5, 0.5), pins=pins, end=end, name="7")
     assert read(Bar, table, "bar") == made
     assert read(Bar, {"holes": 3}, "bar", base=made).holes == 3
-    assert entry_names(Bar)[:3] == ("length", "play", "from")
+    assert files.entry_names(Bar)[:3] == ("length", "play", "from")
 
 
 @pytest.mark.parametrize(
@@ -218,15 +196,15 @@ def test_what_a_table_may_not_hold_is_refused_by_name(change, error, said):
 
 
 def test_the_example_of_the_reader():
-    assert doctest.testmod(reader).failed == 0
+    assert doctest.testmod(files.reader).failed == 0
 
 
 def test_values_are_replaced_at_any_depth():
     data = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 2}}, "force": 3}
     kept = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 4}}, "force": 3}
-    assert override(data, {"drive.torque.end": 4}) == kept
+    assert files.override(data, {"drive.torque.end": 4}) == kept
     with pytest.raises(ParameterError, match="force is 3: it must be a table"):
-        override(data, {"force.x": 4})
+        files.override(data, {"force.x": 4})
 
 
 # Tables of numbers
@@ -234,16 +212,15 @@ def test_values_are_replaced_at_any_depth():
 
 @pytest.mark.parametrize("harm", ["flipped", "cut", "longer", "junk", "empty", "of another library"])
 def test_a_damaged_array_is_not_there(tmp_path, harm):
-    path = save_array(tmp_path / "x.npy", [[1.0, 2.0]])
+    path = files.save_array(tmp_path / "x.npy", [[1.0, 2.0]])
     content = path.read_bytes()
     flipped = bytearray(content)
     flipped[-40] ^= 1  # in a number
     if harm == "of another library":
         np.save(path, np.array([1.0, 2.0]))
     else:
-        path.write_bytes(
-            {"flipped": flipped, "cut": content[:-9], "longer": content + b" ", "junk": b"x" * 50, "empty": b""}[harm]
-        )
+        harms = {"flipped": flipped, "cut": content[:-9], "longer": content + b" ", "junk": b"x" * 50, "empty": b""}
+        path.write_bytes(harms[harm])
     with pytest.warns(RuntimeWarning, match=r"x\.npy is damaged: what was in it is computed again"):
         assert load_array(path) is None
 
@@ -339,9 +316,8 @@ def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
     whole = write_csv(tmp_path / "x.csv", columns).read_bytes()
     monkeypatch.setattr(tables, "_BLOCK", 7)
     assert write_csv(tmp_path / "y.csv", columns).read_bytes() == whole
-    np.savetxt(
-        tmp_path / "z.csv", np.column_stack(list(columns.values())), delimiter=",", header="a,b", comments="", fmt="%.17g"
-    )  # fmt: skip
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(tmp_path / "z.csv", table, delimiter=",", header="a,b", comments="", fmt="%.17g")
     assert (tmp_path / "z.csv").read_bytes() == whole
 
 
@@ -360,11 +336,11 @@ def test_csv_columns_of_different_length_are_refused(tmp_path):
 def test_csv_and_arrays_are_read_back(tmp_path):
     path = write_csv(tmp_path / "x.csv", {"a [m]": [0.1, 2.0], "fx, fy": [1.0, 1 / 3]})
     assert np.column_stack(read_record(path, (None, None))[1]).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
-    assert float(read_rows(path)[1]["fx, fy"]) == 1 / 3
-    assert np.array_equal(load_array(save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
+    assert float(files.read_rows(path)[1]["fx, fy"]) == 1 / 3
+    assert np.array_equal(load_array(files.save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
     assert load_array(tmp_path / "none.npy") is load_array(tmp_path) is None
     with pytest.raises(InputError, match="cannot be read"):
-        read_rows(tmp_path / "none.csv")
+        files.read_rows(tmp_path / "none.csv")
 
 
 @pytest.mark.parametrize(
@@ -408,11 +384,7 @@ def test_blanks_around_the_name_of_a_column_do_not_count(tmp_path):
         ("t,x\n0,1\n0.1,high\n", ("t", "x"), "line 3, column 2: 'high' is not a finite number"),
         ("t,x\n0,1\n0.1\n", ("t", "x"), "line 3, column 2: '' is not a finite number"),
         ("t\n0\n1\n", (None, None), "line 2, column 2: '' is not a finite number"),
-        (
-            "t x\n0 1\n2 3\n",
-            None,
-            "line 2, column 1: '0 1' is not a finite number; between the cells there must be commas",
-        ),
+        ("t x\n0 1\n2 3\n", None, "line 2, column 1: '0 1' .*; between the cells there must be commas"),
         ("0 1\n2 3\n", None, "line 1, column 1: '0 1' is not"),
         ("1 000;2\n3;4\n", None, "line 1, column 1: '1 000' is not"),
         ("\u22121,2\n3,4\n", None, "line 1, column 1: '\u22121' is not"),
@@ -433,14 +405,11 @@ def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
 
 
 def test_a_cell_of_any_length_is_a_sentence(tmp_path):
-    for quote, said in (
-        ("", r"line 2, column 1: '1{40}' is not a finite number"),
-        ('"', "cannot be read: field larger"),
-    ):
+    for quote, said in (("", r"line 2, column 1: '1{40}' is not"), ('"', "cannot be read: field larger")):
         (tmp_path / "x.csv").write_text(f"t\n{quote}{'1' * 200_000}{quote}\n")
         with pytest.raises(InputError, match=rf"x\.csv,? {said}"):
             read_record(tmp_path / "x.csv", ("t",))
 
 
 def test_an_unknown_name_of_any_length_is_cut_in_the_message() -> None:
-    assert len(str(unknown_name("9" * 20_000, ["size"], f"trade_off.over {'9' * 20_000!r}"))) < 1_000
+    assert len(str(files.unknown_name("9" * 20_000, ["size"], f"trade_off.over {'9' * 20_000!r}"))) < 1_000

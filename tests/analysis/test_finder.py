@@ -6,23 +6,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate, variant
+from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, periodic, simulate, variant
 from analysis.linkages import linkage
-from analysis.periodic import (
-    Crossing,
-    Drive,
-    Extremum,
-    Family,
-    OrbitError,
-    Risk,
-    Stability,
-    basins,
-    confirm,
-    frequency_response,
-    newton_orbit,
-    special_gradient,
-    sweep,
-)
+from analysis.periodic import Crossing, Drive, OrbitError, Risk, Stability, basins, frequency_response, newton_orbit
 from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, ParameterError
@@ -187,13 +173,13 @@ def test_a_pitchfork_that_a_step_leaps_over_is_no_fold() -> None:
 
 
 def test_a_resonance_at_a_fold_has_a_gradient() -> None:
-    def peak(damping: float) -> tuple[Extremum, Family]:
+    def peak(damping: float) -> tuple[periodic.Extremum, periodic.Family]:
         response = frequency_response(variant(duffing(0.1), spring_damping=damping), 10.0, 90.0)
         return response.maxima()[0], response.family
 
     top, family = peak(0.75)
     high, low = peak(0.75075)[0], peak(0.74925)[0]
-    found = special_gradient(family, top, ["spring.damping"])
+    found = periodic.special_gradient(family, top, ["spring.damping"])
     assert found.place.by == pytest.approx([(high.parameter - low.parameter) / 1.5e-3], rel=1e-3)
     assert found.amplitude.by == pytest.approx([(high.amplitude - low.amplitude) / 1.5e-3], rel=1e-3)
 
@@ -214,8 +200,7 @@ def test_of_several_the_one_is_found_that_a_machine_meets_from_rest() -> None:
     speed = 1000.0 * RAD_S_PER_RPM
     met = find_orbit(RIG_1_B, speed=speed)
     # up slowly from below, step by step
-    up = sweep(RIG_1_B, np.linspace(300.0, 1000.0, 36) * RAD_S_PER_RPM).orbits[-1]
-    assert up is not None
+    up = periodic.sweep(RIG_1_B, np.linspace(300.0, 1000.0, 36) * RAD_S_PER_RPM).orbits[-1]
     assert met.start == pytest.approx(up.start, abs=1e-9)
     assert met.others == 2
     assert "2 other motions there: find_orbits" in repr(met)
@@ -223,18 +208,14 @@ def test_of_several_the_one_is_found_that_a_machine_meets_from_rest() -> None:
 
 @pytest.mark.parametrize(
     ("name", "damping", "torque", "amplitude"),
-    [
-        ("rig-2-spring-d", 3.0, 0.06, 0.02161),
-        ("rig-2-spring-c", 5.5, 0.05, 0.01698),
-        ("rig-1-spring-b", 9.0, 1.5, 0.05048),
-    ],
+    [("2-spring-d", 3.0, 0.06, 0.02161), ("2-spring-c", 5.5, 0.05, 0.01698), ("1-spring-b", 9.0, 1.5, 0.05048)],
 )
 def test_under_a_motor_whose_frequency_rises_slowly_the_crank_is_captured_at_the_resonance(
-    name: str, damping: float, torque: float, amplitude: float
+    name, damping, torque, amplitude
 ) -> None:
     """A run in time, from rest, with the field's speed rising over 60 s, ends on the motion that is found."""
-    parameters = replace(SETS[name].parameters, slider_damping=damping)
-    full = 1.3 * natural_frequency(parameters)
+    parameters = replace(SETS[f"rig-{name}"].parameters, slider_damping=damping)
+    full = 1.3 * periodic.natural_frequency(parameters)
     motor = InductionMotor(breakdown_torque=torque, breakdown_slip=0.3, synchronous_speed=full)
     met = find_orbit(parameters, torque=motor)
     assert met.amplitude == pytest.approx(amplitude, abs=1e-5)
@@ -253,7 +234,7 @@ def test_motions_far_from_the_zero_of_the_slider() -> None:
     parameters = replace(TABLE_3_1, coupler_length=0.06)
     orbit = find_orbit(parameters, speed=40.0)
     assert orbit.verdict().stability is Stability.STABLE
-    assert confirm(parameters, Drive(speed=40.0), start=orbit.start).agrees
+    assert periodic.confirm(parameters, Drive(speed=40.0), start=orbit.start).agrees
     with pytest.raises(OrbitError):
         newton_orbit(parameters, Drive(speed=40.0), settle=False)
 

@@ -75,11 +75,8 @@ def answer(read: Callable[[], Any]) -> None:
 
 def bounded(examples: int) -> Any:
     """Some examples each time, whatever they take."""
-    return settings(
-        max_examples=examples,
-        deadline=None,
-        suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-    )
+    unchecked = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+    return settings(max_examples=examples, suppress_health_check=unchecked)
 
 
 READERS: dict[str, Callable[[Path], Any]] = {
@@ -123,9 +120,8 @@ def good(name: str, folder: Path) -> bytes:
 @given(data=st.data())
 def test_bytes_changed_cut_and_put_in_between(tmp_path, name, data):
     content = bytearray(good(name, tmp_path))
-    edits = data.draw(
-        st.lists(st.tuples(st.integers(0, len(content)), st.integers(0, 60), st.sampled_from(RUBBISH)), max_size=4)
-    )
+    edit = st.tuples(st.integers(0, len(content)), st.integers(0, 60), st.sampled_from(RUBBISH))
+    edits = data.draw(st.lists(edit, max_size=4))
     for at, cut, put in edits:
         content[at : at + cut] = put.encode()
     if data.draw(st.booleans()):

@@ -3,6 +3,7 @@
 import doctest
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from math import pi
 from types import SimpleNamespace
@@ -13,31 +14,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from analysis import InductionMotor, Inputs
+from analysis import InductionMotor, Inputs, find_orbit, periodic
 from analysis.linkages import linkage
-from analysis.periodic import (
-    Crossing,
-    Drive,
-    Extremum,
-    Family,
-    Gradient,
-    MotionGradient,
-    PeriodicOrbit,
-    Stability,
-    boundary_gradient,
-    crossing_gradient,
-    crossing_test,
-    extrema,
-    extremum_gradient,
-    find_orbit,
-    find_orbits,
-    follow,
-    frequency_response,
-    gradient_names,
-    motion_gradient,
-    newton_orbit,
-    special_gradient,
-)
+from analysis.periodic import Crossing, Drive, Family, PeriodicOrbit, crossing_gradient, motion_gradient, newton_orbit
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.drive import motion_scales
 from analysis.periodic.motion.orbit import trial_orbit
@@ -61,6 +40,7 @@ LIGHT = replace(RIG_2_C, slider_damping=0.5)
 ROTOR = next(iter(rotor_on_cart.MECHANISM.published.values())).parameters
 #: The slider-crank of section 3.1 with a spring on the axial shift.
 SPRUNG = replace(rahman.parameters(20.0, 232.0), shift_stiffness=8000.0, shift_damping=60.0)
+SHIFTED = Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0})
 MOTOR = InductionMotor(breakdown_torque=2.0, breakdown_slip=0.3, synchronous_speed=50.0)
 #: So weak that the speed hangs below the resonance.
 WEAK = InductionMotor(breakdown_torque=0.06, breakdown_slip=0.3, synchronous_speed=60.0)
@@ -121,10 +101,9 @@ def close(found: FloatArray, exact: FloatArray, size: FloatArray | float, step: 
 
 def random_orbit(seed: int) -> PeriodicOrbit:
     parameters = seeded(seed).parameters
-    smooth = replace(
-        parameters, slider_coulomb_friction=0.0, slider_damping=20.0, slider_stiffness=2000.0, gravity=9.81
-    )
-    short = replace(smooth, crank_length=0.4 * smooth.crank_length, slider_spring_free_position=0.0)
+    smooth = {"slider_coulomb_friction": 0.0, "slider_damping": 20.0, "slider_stiffness": 2000.0, "gravity": 9.81}
+    length = 0.4 * parameters.crank_length
+    short = replace(parameters, **smooth, crank_length=length, slider_spring_free_position=0.0)
     return newton_orbit(short, Drive(speed=25.0))
 
 
@@ -135,13 +114,10 @@ MOTIONS: dict[str, tuple[Callable[[], PeriodicOrbit], tuple[str, ...]]] = {
     "motor, force": (lambda: find_orbit(RIG_2_C, Inputs(torque=MOTOR, force=1.0)), ("drive.applied_torque", "pin.A")),
     "torque": (lambda: newton_orbit(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0)), ("slider.guide_force",)),
     "two turns": (lambda: newton_orbit(RIG_2_C, Drive(speed=480.0 * RPM), turns=2), ("pin.D",)),
-    "doubled": (lambda: find_orbits(LIGHT, speed=1150.0 * RPM, turns=2).orbits[-1], ("pin.D",)),
+    "doubled": (lambda: periodic.find_orbits(LIGHT, speed=1150.0 * RPM, turns=2).orbits[-1], ("pin.D",)),
     # the Fourier series of the check cannot hold what friction does
     "friction": (lambda: newton_orbit(replace(RIG_2_C, slider_coulomb_friction=0.3), Drive(speed=500.0 * RPM)), ()),
-    "slider-crank": (
-        lambda: newton_orbit(SPRUNG, Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0})),
-        ("drive.applied_torque",),
-    ),
+    "slider-crank": (lambda: newton_orbit(SPRUNG, SHIFTED), ("drive.applied_torque",)),
     "rotor, motor": (lambda: find_orbit(ROTOR, Inputs(torque=(MOTOR, -0.1))), ("cart.acceleration",)),
     "random 0": (lambda: random_orbit(0), ("pin.A",)),
     "random 7": (lambda: random_orbit(7), ("pin.B",)),
@@ -174,7 +150,7 @@ def test_a_motion_changes_with_every_parameter_as_its_differences_say(name: str)
             continue
         # the large motion bends more
         step = step_of(orbit, parameter, 5e-4 if name == "doubled" else 2e-3)
-        found = difference(lambda v, p=parameter: quantities(changed(orbit, p, v)), value, step)  # type: ignore[misc]
+        found = difference(lambda v, p=parameter: quantities(changed(orbit, p, v)), value, step)
         assert close(found, exact[:, column], size, step), (parameter, found, exact[:, column])
 
 
@@ -218,15 +194,15 @@ def test_resonance_of_the_rotor_has_its_closed_form() -> None:
     m, r, k, c = ROTOR.rotor_mass, ROTOR.rotor_radius, ROTOR.cart_stiffness, ROTOR.cart_damping
     mass = ROTOR.cart_mass + m
     resonance = k / np.sqrt(k * mass - 0.5 * c * c)
-    found = extremum_gradient(newton_orbit(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
+    found = periodic.extremum_gradient(newton_orbit(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
     assert found.place.value == pytest.approx(resonance, rel=1e-9)
     # along a branch too, where an amplitude alone would leave it open to the root of its error
     low, high = 0.9 * resonance, 1.1 * resonance
-    (top,) = frequency_response(ROTOR, low, high, doublings=0, greatest_step=5e-2).maxima()
+    (top,) = periodic.frequency_response(ROTOR, low, high, doublings=0, greatest_step=5e-2).maxima()
     assert top.parameter == pytest.approx(resonance, rel=1e-9)
     # so does a branch over what a function says, to what that leaves
     family = Family(parameters=ROTOR, drive=Drive(speed=low), vary=lambda speed: (ROTOR, Drive(speed=speed)))
-    (top,) = extrema(follow(family, newton_orbit(ROTOR, Drive(speed=low)), low, low=low, high=high))
+    (top,) = periodic.extrema(periodic.follow(family, newton_orbit(ROTOR, Drive(speed=low)), low, low=low, high=high))
     assert top.parameter == pytest.approx(resonance, rel=1e-4)
     assert found.amplitude.value == pytest.approx(m * r / (c * np.sqrt(mass / k - (0.5 * c / k) ** 2)), rel=1e-9)
     inner = k * mass - 0.5 * c * c
@@ -253,62 +229,45 @@ def relocated(orbit: PeriodicOrbit, kind: Crossing, along: str, name: str, value
 
     def residual(z: FloatArray) -> FloatArray:
         period = operating_point(*operation(z)).period(z[:-1] * scale[:-1], orbit.turns)
-        return np.append(period.shift / scale[:-1], crossing_test(period.monodromy, kind))
+        return np.append(period.shift / scale[:-1], periodic.crossing_test(period.monodromy, kind))
 
     found = root(residual, np.append(orbit.start, here) / scale, tol=1e-13, options={"eps": 1e-7}).x
     there = replace(orbit, parameters=operation(found)[0], drive=operation(found)[1], start=found[:-1] * scale[:-1])
     return np.array([found[-1] * scale[-1], amplitude(there)])
 
 
-#: Parameters, drive, along, range of the branch with its beginning first, direction, turns and guess, kind.
-POINTS: dict[str, tuple[Any, Drive, str, tuple[float, float, float], int, tuple[int, Any], Crossing]] = {
-    "fold": (
-        RIG_1_B, Drive(speed=1000.0 * RPM), "drive.speed",
-        (1000.0 * RPM, 990.0 * RPM, 1100.0 * RPM), 1, (1, None), Crossing.FOLD,
-    ),
-    "fold, torque": (
-        RIG_2_C, Drive(torque=0.04), "drive.torque", (0.04, 0.03, 0.06), 1, (1, (0.0, 0.0, 60.0)), Crossing.FOLD,
-    ),
-    "doubling": (
-        LIGHT, Drive(speed=1180.0 * RPM), "drive.speed",
-        (1180.0 * RPM, 1170.0 * RPM, 1185.0 * RPM), -1, (1, None), Crossing.PERIOD_DOUBLING,
-    ),
-    "doubling of a doubled motion": (
-        RIG_1_B, Drive(speed=920.0 * RPM), "drive.speed",
-        (920.0 * RPM, 914.0 * RPM, 925.0 * RPM), -1, (2, (0.0185, -16.449)), Crossing.PERIOD_DOUBLING,
-    ),
-    "fold, motor": (
-        RIG_2_C, Drive(motor=WEAK), FIELD, (60.0, 55.0, 80.0), 1, (1, None), Crossing.FOLD,
-    ),
-    "torus": (
-        TABLE_3_1, Drive(torque=0.12), "drive.torque", (0.12, 0.1, 0.13), -1, (1, (0.0, 0.0, 90.0)), Crossing.TORUS,
-    ),
-}  # fmt: skip
+#: Parameters, along, range of the branch (rpm, N.m) with its beginning first, direction, turns and guess, kind.
+POINTS: dict[str, tuple[Any, str, tuple[float, float, float], int, tuple[int, Any], Crossing]] = {
+    "fold": (RIG_1_B, "drive.speed", (1000.0, 990.0, 1100.0), 1, (1, None), Crossing.FOLD),
+    "fold, torque": (RIG_2_C, "drive.torque", (0.04, 0.03, 0.06), 1, (1, (0.0, 0.0, 60.0)), Crossing.FOLD),
+    "fold, motor": (RIG_2_C, FIELD, (60.0, 55.0, 80.0), 1, (1, None), Crossing.FOLD),
+    "doubling": (LIGHT, "drive.speed", (1180.0, 1170.0, 1185.0), -1, (1, None), Crossing.PERIOD_DOUBLING),
+    "doubled": (RIG_1_B, "drive.speed", (920.0, 914.0, 925.0), -1, (2, (0.0185, -16.449)), Crossing.PERIOD_DOUBLING),
+    "torus": (TABLE_3_1, "drive.torque", (0.12, 0.1, 0.13), -1, (1, (0.0, 0.0, 90.0)), Crossing.TORUS),
+}
 
 
 @pytest.mark.parametrize("name", [n if n == "fold" else pytest.param(n, marks=pytest.mark.slow) for n in POINTS])
 def test_a_special_point_moves_as_its_differences_say(name: str) -> None:
-    parameters, drive, along, (begin, low, high), direction, (turns, guess), kind = POINTS[name]
+    parameters, along, ends, direction, (turns, guess), kind = POINTS[name]
+    begin, low, high = (end * (RPM if along == "drive.speed" else 1.0) for end in ends)
+    drive = Drive(motor=WEAK) if along == FIELD else Drive(**{along.removeprefix("drive."): begin})
     family = Family(parameters=parameters, drive=drive, vary=along)
     orbit = newton_orbit(parameters, drive, turns=turns, start=guess)
-    branch = follow(family, orbit, begin, low=low, high=high, direction=direction)
+    branch = periodic.follow(family, orbit, begin, low=low, high=high, direction=direction)
     point = next(s for s in branch.special if s.kind is kind)
     chosen = ("slider.damping", "slider.stiffness", "crank.length", "rocker.mass", "coupler.cog_angle", "slider.force")
-    found = special_gradient(family, point, chosen)
+    found = periodic.special_gradient(family, point, chosen)
     assert found.place.value == pytest.approx(point.parameter, rel=1e-8)
     size = np.array([found.place.value, found.amplitude.value])
     for column, parameter in enumerate(chosen):
         step = step_of(found.orbit, parameter, 2e-3)
-        differences = difference(
-            lambda v, p=parameter: relocated(found.orbit, kind, along, p, v),  # type: ignore[misc]
-            found.place.at[column],
-            step,
-            levels=3,
-        )
+        moved = partial(relocated, found.orbit, kind, along, parameter)
+        differences = difference(moved, found.place.at[column], step, levels=3)
         exact = np.array([found.place.by[column], found.amplitude.by[column]])
         assert close(differences, exact, size, step), (parameter, differences, exact)
     # the normal of the boundary over two parameters is across the direction in which it goes
-    normal = boundary_gradient(found.orbit, kind, (along, "slider.damping"))
+    normal = periodic.boundary_gradient(found.orbit, kind, (along, "slider.damping"))
     assert normal["slider.damping"] / normal[along] == pytest.approx(-found.place["slider.damping"], rel=1e-8)
     # from a motion beside it the same point is found
     beside = changed(found.orbit, along, found.place.value * (0.998 if kind is Crossing.FOLD else 1.001))
@@ -334,20 +293,16 @@ def test_a_resonance_moves_as_its_differences_say() -> None:
                     break
         return np.array([speeds[-1], amplitude(there)])
 
-    response = frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doublings=0)
+    response = periodic.frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doublings=0)
     (peak,) = response.maxima()
-    found = special_gradient(response.family, peak)
+    found = periodic.special_gradient(response.family, peak)
     assert found.place.value == pytest.approx(peak.parameter, rel=1e-9)
     assert found.amplitude.value == pytest.approx(peak.amplitude, rel=1e-6)
     size = np.array([found.place.value, found.amplitude.value])
     for name in ("slider.damping", "slider.stiffness", "crank.length", "rocker.inertia", "slider.guide_angle"):
         column = found.place.names.index(name)
         step = step_of(found.orbit, name, 4e-3)
-        differences = difference(
-            lambda v, p=name: resonance(found.orbit, p, v),  # type: ignore[misc]
-            found.place.at[column],
-            step,
-        )
+        differences = difference(partial(resonance, found.orbit, name), found.place.at[column], step)
         exact = np.array([found.place.by[column], found.amplitude.by[column]])
         assert close(differences, exact, size, step), (name, differences, exact)
     # a stiffer spring by 1 % resonates half a percent higher: w^2 = k / m
@@ -359,21 +314,17 @@ def test_tests_of_crossings_are_those_of_the_monodromy_matrix() -> None:
     motion = motion_gradient(orbit, ("slider.damping", "drive.torque"))
     for kind in Crossing:
         test = motion.test(kind)
-        assert test.value == pytest.approx(float(crossing_test(orbit.monodromy, kind)), rel=1e-10)
+        assert test.value == pytest.approx(float(periodic.crossing_test(orbit.monodromy, kind)), rel=1e-10)
         for column, name in enumerate(motion.names):
             step = step_of(orbit, name, 2e-3)
-            found = difference(
-                lambda v, p=name, k=kind: crossing_test(changed(orbit, p, v).monodromy, k),  # type: ignore[misc]
-                motion.values[column],
-                step,
-            )
+            moved = partial(changed, orbit, name)
+            found = difference(lambda v: periodic.crossing_test(moved(v).monodromy, kind), motion.values[column], step)  # noqa: B023
             assert close(found, test.by[column], 1.0, step)
 
 
 def in_pieces(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
     """The motion at another parameter by Newton's method on y at the stations."""
     parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
-    assert orbit.stations is not None
     angles, starts = orbit.stations.angles, orbit.stations.starts.copy()
     k, n = starts.shape
     for _ in range(6):
@@ -393,7 +344,7 @@ def test_an_unstable_motion_that_is_followed_in_pieces() -> None:
     """A multiplier of thousands: the derivatives of the motion are as good as those of a stable one."""
     orbit = newton_orbit(RIG_1_B, Drive(speed=1200.0 * RPM))
     family = Family(parameters=RIG_1_B, drive=orbit.drive)
-    branch = follow(family, orbit, 1200.0 * RPM, low=500.0 * RPM, high=1300.0 * RPM, direction=-1)
+    branch = periodic.follow(family, orbit, 1200.0 * RPM, low=500.0 * RPM, high=1300.0 * RPM, direction=-1)
     grown = [o for o in branch.orbits if o.stations is not None and o.largest > 1e3]
     orbit = grown[len(grown) // 2]
     motion = motion_gradient(orbit, ("drive.speed", "slider.damping", "crank.length"))
@@ -415,9 +366,7 @@ def test_a_motion_against_a_stop_changes_as_its_differences_say(law: str) -> Non
     bar.body("crank", bar=("A", "B"), length=0.01, mass=0.1, inertia=1e-4)
     bar.body("yoke", points={"Y": (0.0, 0.0)}, mass=1.0, inertia=1e-3)
     bar.body("block", points={"Q": (0.0, 0.0)}, mass=2.0, inertia=1e-3)
-    bar.slide("guide", body="yoke", through="A", direction=0).slide(
-        "way", body="block", on="yoke", through="Y", direction=0
-    )
+    bar.slide("guide", body="yoke", through="A").slide("way", body="block", on="yoke", through="Y")
     bar.slot("slot", pin="B", on="yoke", through="Y", direction=0.5 * pi)
     bar.spring("soft", at="way", stiffness=800.0, free=0, damping=4.0)
     stiff = 2e3 if law.endswith(")") else 2e6 if law.endswith("1.5") else 2e8
@@ -448,7 +397,7 @@ def test_the_end_of_a_motion_that_is_not_closed_is_no_bend_of_a_law() -> None:
 def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     """The derivative at none, from the side on which there is some."""
     orbit = newton_orbit(RIG_2_C, Drive(speed=500.0 * RPM))
-    assert "slider.friction_coefficient" not in gradient_names(orbit.parameters, orbit.drive)
+    assert "slider.friction_coefficient" not in periodic.gradient_names(orbit.parameters, orbit.drive)
     (slope,) = motion_gradient(orbit, ("slider.friction_coefficient",)).amplitude.by
 
     def size(coefficient: float) -> float:
@@ -475,25 +424,24 @@ def test_what_has_no_gradient_says_so() -> None:
     with pytest.raises(UnknownNameError, match=r"pin.Z"):
         motion.peak("pin.Z")
     with pytest.raises(LinkworkError, match="no extremum"):
-        extremum_gradient(newton_orbit(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
+        periodic.extremum_gradient(newton_orbit(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
     with pytest.raises(LinkworkError, match="no period doubling"):
         crossing_gradient(orbit, Crossing.PERIOD_DOUBLING, "drive.speed")
     # nothing moves a rotor without excitation
     still = newton_orbit(torsion.Parameters(rotor_stiffness=1.0, rotor_damping=0.1), Drive(speed=0.5))
     with pytest.raises(LinkworkError, match="no extremum"):
-        extremum_gradient(still, "drive.speed")
+        periodic.extremum_gradient(still, "drive.speed")
     # what two multipliers of an undamped motion are multiplied to is 1 at any speed
     undamped = newton_orbit(replace(RIG_2_C, slider_damping=0.0), Drive(speed=500.0 * RPM))
     with pytest.raises(LinkworkError):
         crossing_gradient(undamped, Crossing.TORUS, "drive.speed")
     family = Family(parameters=RIG_2_C, drive=orbit.drive, vary=lambda value: (RIG_2_C, Drive(speed=value)))
-    peak = Extremum(parameter=1.0, amplitude=1.0, stability=Stability.STABLE, orbit=orbit)
+    peak = periodic.Extremum(parameter=1.0, amplitude=1.0, stability=periodic.Stability.STABLE, orbit=orbit)
     with pytest.raises(InputError, match="is a function"):
-        special_gradient(family, peak)
-    nothing = Gradient(value=0.0, names=("a",), by=np.ones(1), at=np.ones(1))
+        periodic.special_gradient(family, peak)
+    nothing = periodic.Gradient(value=0.0, names=("a",), by=np.ones(1), at=np.ones(1))
     with pytest.raises(InputError, match="no elasticities"):
         nothing.movers()
-    assert isinstance(motion, MotionGradient)
 
 
 @pytest.mark.parametrize("panel", [0, 3, 5])
@@ -503,6 +451,6 @@ def test_the_greatest_value_is_found_wherever_in_a_panel_it_lies(panel: int, pla
     values = np.full((6, len(x)), -1.0)
     # above the others next to its place alone
     values[panel] = 0.1 - 20.0 * (x - place) ** 2
-    value, found = Variations.greatest_value(SimpleNamespace(h=np.ones(6)), values)  # type: ignore[arg-type]
+    value, found = Variations.greatest_value(SimpleNamespace(h=np.ones(6)), values)
     assert (value, found.panel, found.position) == pytest.approx((0.1, panel, place), abs=1e-12)
     assert found.weights @ values[panel] == pytest.approx(value, abs=1e-12)

@@ -10,21 +10,11 @@ import pytest
 
 pytest.importorskip("casadi")
 
+from analysis import youssef
 from analysis.numerics.fourier import FourierSeries
 from analysis.studies.youssef.runs import steady_turn
 from analysis.units import CM_PER_METRE, RAD_S_PER_RPM
-from analysis.youssef import (
-    HarmonicBalanceError,
-    HarmonicMotion,
-    Load,
-    SliderEquation,
-    Variant,
-    harmonic_balance,
-    nonlinear_harmonic_balance,
-    resonance,
-    slider_equation,
-    two_harmonics,
-)
+from analysis.youssef import Load, Variant, harmonic_balance, nonlinear_harmonic_balance, resonance, slider_equation
 from analysis.youssef import harmonics as hb
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -34,7 +24,7 @@ from tests import published
 RIG_1_A, RIG_1_B = (SETS[f"rig-1-spring-{spring}"].parameters for spring in "ab")
 
 ONE = FourierSeries.constant(1.0)
-UNDAMPED = SliderEquation(mass=ONE, stiffness=0.0 * ONE, force=ONE, spring=1.0, damping=0.0)
+UNDAMPED = youssef.SliderEquation(mass=ONE, stiffness=0.0 * ONE, force=ONE, spring=1.0, damping=0.0)
 #: Upside down the rocker topples.
 TOPPLING = replace(chapter_4(1.0), slider_stiffness=1e-3, gravity=500.0, coupler_mass=2.0, coupler_cog_distance=0.3)
 ANGLES = np.linspace(0.0, 2.0 * pi, 60, endpoint=False)
@@ -54,7 +44,7 @@ class TestTwoHarmonics:
         bend = -value * np.array([0.0, 1.0, 1.0, 4.0, 4.0])
         left = a(x)[:, None] * bend + b(x)[:, None] * rate + c(x)[:, None] * value
         a0, a1, b1, a2, b2 = np.linalg.solve(value.T @ left, value.T @ e.force(x))
-        zeta = two_harmonics(e).series
+        zeta = youssef.two_harmonics(e).series
         assert zeta.cos == pytest.approx([a0, a1, a2], rel=1e-12)
         assert zeta.sin == pytest.approx([0.0, b1, b2], rel=1e-12)
 
@@ -88,7 +78,7 @@ class TestLinear:
 
     def test_constant_coefficients_in_closed_form(self) -> None:
         force = FourierSeries(np.array([0.3, 0.0, 2.0]), np.array([0.0, 1.0, 0.0]))
-        e = SliderEquation(mass=ONE, stiffness=0.5 * ONE, force=force, spring=0.7, damping=0.2)
+        e = youssef.SliderEquation(mass=ONE, stiffness=0.5 * ONE, force=force, spring=0.7, damping=0.2)
         motion = harmonic_balance(e, 5)
         assert motion.series.mean == pytest.approx(0.3 / 1.2, rel=1e-14)
         assert motion.harmonic(1) == pytest.approx(1.0 / np.hypot(0.2, 0.2), rel=1e-14)
@@ -104,10 +94,8 @@ class TestLinear:
         p = replace(RIG_1_B, ground_inclination=0.7, slider_damping=7.0)
         load, speeds = Load(x=3.0, slider=20.0), np.array([[20.0, 60.0], [90.0, 140.0]])
         many = hb.harmonic_amplitudes(p, speeds, 5, variant=variant, load=load)
-        each = [
-            p.rocker_length * harmonic_balance(slider_equation(p, w, variant=variant, load=load), 5).amplitude
-            for w in speeds.ravel()
-        ]
+        equations = [slider_equation(p, w, variant=variant, load=load) for w in speeds.ravel()]
+        each = [p.rocker_length * harmonic_balance(equation, 5).amplitude for equation in equations]
         assert many == pytest.approx(np.reshape(each, (2, 2)), rel=1e-9)
 
     def test_amplitude_is_half_of_peak_to_peak(self) -> None:
@@ -115,8 +103,8 @@ class TestLinear:
         cosine = (sqrt(3.0) - 1.0) / 2.0
         series = FourierSeries(np.array([5.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.25]))
         greatest = sqrt(1.0 - cosine**2) * (1.0 + 0.5 * cosine)
-        assert HarmonicMotion(series=series, residual=0.0).amplitude == pytest.approx(greatest, rel=1e-15)
-        assert HarmonicMotion(series=FourierSeries.constant(3.0), residual=0.0).amplitude == 0.0
+        assert youssef.HarmonicMotion(series=series, residual=0.0).amplitude == pytest.approx(greatest, rel=1e-15)
+        assert youssef.HarmonicMotion(series=FourierSeries.constant(3.0), residual=0.0).amplitude == 0.0
 
 
 class TestNonlinear:
@@ -134,9 +122,8 @@ class TestNonlinear:
         assert CM_PER_METRE * motion.position(angle) == pytest.approx(turn.slider_cm, abs=1e-6)
         assert motion.torque(angle) == pytest.approx(turn.torque, abs=1e-7)
         assert CM_PER_METRE * motion.amplitude == pytest.approx(0.5 * np.ptp(turn.slider_cm), abs=1e-5)
-        assert CM_PER_METRE * motion.harmonic(2) == pytest.approx(
-            np.abs(np.fft.rfft(turn.slider_cm[:-1])[2]) / 720.0, abs=1e-6
-        )
+        second = np.abs(np.fft.rfft(turn.slider_cm[:-1])[2]) / 720.0
+        assert CM_PER_METRE * motion.harmonic(2) == pytest.approx(second, abs=1e-6)
         assert motion.residual < 1e-14
 
     def test_the_adaptive_order_changes_nothing_any_more(self) -> None:
@@ -186,20 +173,16 @@ class TestErrors:
             (lambda: resonance(chapter_4(1.0), harmonic=0, order=2), InputError, "harmonic"),
             (lambda: resonance(chapter_4(1.0), harmonic=3, order=2), InputError, "harmonic"),
             (lambda: resonance(replace(chapter_4(1.0), slider_stiffness=0.0)), InputError, "stiffness"),
-            (lambda: resonance(TOPPLING), HarmonicBalanceError, "resonance"),
+            (lambda: resonance(TOPPLING), youssef.HarmonicBalanceError, "resonance"),
             (lambda: harmonic_balance(slider_equation(TABLE_3_1, 44.0), -1), InputError, "order -1"),
-            (lambda: harmonic_balance(UNDAMPED, 2), HarmonicBalanceError, r"singular at lambda_k\^2 = 1"),
-            (
-                lambda: nonlinear_harmonic_balance(TABLE_3_1, 44.0, 4, start=5.0 * ONE),
-                AssemblyError,
-                "slider position 5 m",
-            ),
+            (lambda: harmonic_balance(UNDAMPED, 2), youssef.HarmonicBalanceError, r"singular at lambda_k\^2 = 1"),
+            (lambda: nonlinear_harmonic_balance(TABLE_3_1, 44.0, 4, start=5.0 * ONE), AssemblyError, "position 5 m"),
             (lambda: nonlinear_harmonic_balance(TABLE_3_1, 44.0, -2), InputError, "order -2"),
             (lambda: nonlinear_harmonic_balance(TABLE_3_1, 44.0, tolerance=0.0), InputError, "tolerance"),
             # next to a resonance without damping there may be none
             (
                 lambda: nonlinear_harmonic_balance(chapter_4(1.0), 0.999 * resonance(chapter_4(1.0))[0]),
-                HarmonicBalanceError,
+                youssef.HarmonicBalanceError,
                 "does not converge: residual",
             ),
         ],
@@ -210,12 +193,12 @@ class TestErrors:
 
     def test_too_few_iterations(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(hb, "MOST_ITERATIONS", 2)
-        with pytest.raises(HarmonicBalanceError, match=r"order 8 at 44 rad/s .* residual .* after 2 iterations"):
+        with pytest.raises(youssef.HarmonicBalanceError, match=r"order 8 at 44 rad/s .* residual .* 2 iterations"):
             nonlinear_harmonic_balance(TABLE_3_1, 44.0)
 
     def test_harmonics_that_do_not_die_away(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(hb, "ORDERS", (2, 4))
-        with pytest.raises(HarmonicBalanceError, match="harmonic 4 is still"):
+        with pytest.raises(youssef.HarmonicBalanceError, match="harmonic 4 is still"):
             nonlinear_harmonic_balance(TABLE_3_1, 44.0)
 
     def test_a_linear_start_out_of_reach_is_made_smaller(self) -> None:
@@ -244,7 +227,7 @@ class TestSecondHarmonic:
         """The right second harmonic relative to a variant's."""
         p = chapter_4(1.0, 0.45)
         right = nonlinear_harmonic_balance(p, self.SPEED).harmonic(2) / p.rocker_length
-        return right / two_harmonics(slider_equation(p, self.SPEED, variant=variant)).harmonic(2)
+        return right / youssef.two_harmonics(slider_equation(p, self.SPEED, variant=variant)).harmonic(2)
 
     def test_the_second_order_force_makes_it(self) -> None:
         assert self.ratio(Variant.SECOND_ORDER) == pytest.approx(1.0, abs=0.01)

@@ -11,26 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import cosimulate, simulate
+from analysis import cosimulate, files, simulate
 from analysis.cli.common import WRONG, print_error, say, show_table
 from analysis.figures.style import Figure
-from analysis.files import (
-    WritingError,
-    attribute_files,
-    check_fmu,
-    outputs,
-    paths,
-    read_points,
-    read_record,
-    read_rows,
-    read_tables,
-    save_array,
-    save_figure,
-    write_text,
-)
+from analysis.files import attribute_files, check_fmu, read_points, read_record, read_rows, read_tables, write_text
 from analysis.run import CASES, CosimulationError, load_case, read_case
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.published import TABLE_3_1
+
+from .conftest import copied
 
 # Where files end
 
@@ -48,12 +37,8 @@ def read_two_columns(path):
         ("x.toml", ".".join("a" * 300) + " = 1", "deeper than 50"),
         ("x.toml", "a = " + "9" * 5000, "not valid TOML"),
         ("x.json", '{"a": ' + "9" * 5000 + "}", "not valid JSON"),
-        ("x.toml", "a = 0x" + "f" * 5000, "a is a whole number of more than 1024 bits"),
-        (
-            "x.json",
-            json.dumps({"a": [{"title": "x" * 20_000}]}),
-            r"a\[0\]\.title has 20000 characters: 10000 are the most",
-        ),
+        ("x.toml", f"a = {2**1024}", "a is a whole number of more than 1024 bits"),
+        ("x.json", json.dumps({"a": [{"title": "x" * 20_000}]}), "title has 20000 characters: 10000 are the most"),
         ("x.json", json.dumps({"a" * 300: 1}), "has 300 characters: 200 are the most"),
         ("x.json", '{"a": "\\ud800"}', "half a character"),
     ],
@@ -82,11 +67,9 @@ def test_large_files_are_refused_until_the_limit_is_raised(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(os.name == "nt", reason="devices and pipes have no paths there")
-@pytest.mark.parametrize(
-    ("kind", "said"), [("pipe", "is a pipe"), ("device", "is a device"), ("folder", "is a folder")]
-)
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
 @pytest.mark.parametrize("reader", [read_two_columns, read_rows, read_points, read_tables, check_fmu])
-def test_what_may_never_end_is_not_read(tmp_path, kind, said, reader):
+def test_what_may_never_end_is_not_read(tmp_path, kind, reader):
     path = tmp_path / ("x.toml" if reader is read_tables else "x.csv")
     if kind == "pipe":
         os.mkfifo(path)
@@ -94,7 +77,7 @@ def test_what_may_never_end_is_not_read(tmp_path, kind, said, reader):
         path.mkdir()
     else:
         path.symlink_to("/dev/zero")
-    with pytest.raises(InputError, match=f"{said}: it must be a file"):
+    with pytest.raises(InputError, match=f"is a {kind}: it must be a file"):
         reader(path)
 
 
@@ -183,15 +166,9 @@ def test_a_run_of_too_many_samples_is_refused(monkeypatch):
 @pytest.mark.parametrize(
     ("force", "said"),
     [
-        (
-            {"kind": "harmonics", "amplitudes": [1], "frequencies": [1], "phases": 3},
-            r"force\.phases is 3: it must be a list",
-        ),
+        ({"kind": "harmonics", "amplitudes": [1], "frequencies": [1], "phases": 3}, r"force\.phases is 3"),
         ({"kind": "table", "file": "a\0b"}, "cannot be read: embedded null"),
-        (
-            {"kind": "table", "times": [0, 1e-320, 1e300], "values": [0, 1e308, -1e308], "interpolation": "cubic"},
-            "force cannot be made a signal",
-        ),
+        ({"kind": "table", "times": [0, 1e-320], "values": [0, 1e308], "interpolation": "cubic"}, "force cannot"),
     ],
 )
 def test_signals_that_are_none(tmp_path, force, said):
@@ -210,9 +187,6 @@ def test_errors_do_not_repeat_megabytes(tmp_path, value):
 def test_a_whole_number_of_1024_bits_is_read(tmp_path):
     (tmp_path / "x.toml").write_text(f"a = {2**1024 - 1}")
     assert read_tables(tmp_path / "x.toml") == {"a": 2**1024 - 1}
-    (tmp_path / "x.toml").write_text(f"a = {2**1024}")
-    with pytest.raises(InputError, match="more than 1024 bits"):
-        read_tables(tmp_path / "x.toml")
 
 
 # FMUs
@@ -270,9 +244,7 @@ def test_an_fmu_that_fails_at_the_start_leaves_no_folder(tmp_path, monkeypatch, 
     (tmp_path / "unpacked").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "unpacked"))
     broken = tmp_path / "broken.fmu"
-    with zipfile.ZipFile(fmu) as archive, zipfile.ZipFile(broken, "w") as copy:
-        for member in archive.infolist():
-            copy.writestr(member, b"no library" if member.filename.startswith("binaries") else archive.read(member))
+    copied(fmu, broken, lambda name, content: b"no library" if name.startswith("binaries") else content)
     case, here = CASES["speed-jump"], Path.cwd()
     with pytest.raises(CosimulationError):
         cosimulate(broken, case.parameters, case.inputs, stop_time=0.1)
@@ -283,8 +255,7 @@ def test_an_fmu_that_fails_at_the_start_leaves_no_folder(tmp_path, monkeypatch, 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04" + bytes(100)])
 def test_what_is_no_fmu_is_a_sentence(tmp_path, linkwork, content):
     (tmp_path / "x.fmu").write_bytes(content)
-    result = linkwork("info", "x.fmu")
-    assert result.exit_code == 1
+    result = linkwork("info x.fmu", code=1)
     assert "x.fmu is not an FMU" in result.stderr
 
 
@@ -307,22 +278,22 @@ class Full:
     "write",
     [
         lambda path: write_text(path, "x"),
-        lambda path: save_array(path, [1.0]),
-        lambda path: save_figure(Figure(), path),
+        lambda path: files.save_array(path, [1.0]),
+        lambda path: files.save_figure(Figure(), path),
     ],
 )
 def test_a_full_disk_names_the_file_and_leaves_what_was_there(tmp_path, monkeypatch, write):
     path = tmp_path / "x.png"
     path.write_bytes(b"before")
     Full(monkeypatch)
-    with pytest.raises(WritingError, match=r"x\.png cannot be written: No space left on device"):
+    with pytest.raises(files.WritingError, match=r"x\.png cannot be written: No space left on device"):
         write(path)
     assert [p.name for p in tmp_path.iterdir()] == ["x.png"]
     assert path.read_bytes() == b"before"
 
 
 def test_a_part_of_a_file_does_not_stay(tmp_path):
-    with pytest.raises(UnicodeEncodeError), paths.write_completely(tmp_path / "x") as part:
+    with pytest.raises(UnicodeEncodeError), files.paths.write_completely(tmp_path / "x") as part:
         part.write_text("half \ud800", encoding="utf-8")
     assert not list(tmp_path.iterdir())
 
@@ -337,21 +308,16 @@ def test_a_command_writes_over_its_own_files_and_no_others(tmp_path):
 
     assert write("run", "1") == ("x.txt", [])
     assert write("run", "2") == ("x.txt", [])
-    name, notes = write("check", "3")
+    name, (note,) = write("check", "3")
     assert name == "x-2.txt"
-    assert len(notes) == 1
     assert (
-        "x.txt was changed since 'linkwork check' wrote it, or is not its file, and is kept: the new file is x-2.txt; --force"
-        in notes[0]
+        "was changed since 'linkwork check' wrote it, or is not its file, and is kept: the new file is x-2.txt" in note
     )
     (tmp_path / "x.txt").write_text("changed by hand")
     assert write("run", "4")[0] == "x-3.txt"
     assert write("check", "5")[0] == "x-2.txt"
-    assert {p.name: p.read_text() for p in tmp_path.glob("x*")} == {
-        "x.txt": "changed by hand",
-        "x-2.txt": "5",
-        "x-3.txt": "4",
-    }
+    there = {path.name: path.read_text() for path in tmp_path.glob("x*")}
+    assert there == {"x.txt": "changed by hand", "x-2.txt": "5", "x-3.txt": "4"}
     assert write("run", "6", force=True) == ("x.txt", [])
     assert write("run", "7") == ("x.txt", [])
     # in Python a path means what it says
@@ -365,9 +331,7 @@ def test_a_file_of_a_command_is_not_lost_to_the_new_name_of_another(tmp_path):
             names = [write_text(tmp_path / name, name).name for name in ("x.txt", "x-2.txt", "x.txt", "x-3.txt")]
         assert names == ["x-2.txt", "x-2-2.txt", "x-2.txt", "x-3.txt"]
         (note,) = writing.notes
-        assert note.startswith(
-            "2 files were changed since 'linkwork exact' wrote them, or are not its files, and are kept"
-        )
+        assert note.startswith("2 files were changed since 'linkwork exact' wrote them, or are not its files, and are")
         assert "the new files are x-2.txt, x-2-2.txt; --force" in note
     # whichever is written first
     with attribute_files("check"):
@@ -389,7 +353,6 @@ def test_the_option_force(tmp_path, linkwork):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "table-3.1.csv").write_text("measured for a week")
     result = linkwork(*words)
-    assert result.exit_code == 0
     assert "wrote out/table-3.1-2.csv" in result.stdout
     assert "table-3.1.csv was changed since 'linkwork run' wrote it" in " ".join(result.stderr.split())
     assert (tmp_path / "out" / "table-3.1.csv").read_text() == "measured for a week"
@@ -398,7 +361,7 @@ def test_the_option_force(tmp_path, linkwork):
         assert "wrote out/table-3.1.csv" in result.stdout
         assert not result.stderr
     assert len(read_record(tmp_path / "out" / "table-3.1.csv", ("time",))[1][0]) > 1
-    assert outputs.RECORD in os.listdir(tmp_path / "out")
+    assert files.outputs.RECORD in os.listdir(tmp_path / "out")
 
 
 # Messages
@@ -422,21 +385,16 @@ def test_a_terminal_is_given_no_orders(capsys):
 def test_a_title_with_broken_mathematics_is_drawn(tmp_path):
     figure = Figure()
     figure.suptitle("costs $x^ and $5")
-    assert save_figure(figure, tmp_path / "x.png").stat().st_size > 1000
+    assert files.save_figure(figure, tmp_path / "x.png").stat().st_size > 1000
 
 
 @pytest.mark.fmu
 @pytest.mark.parametrize("name", ["crank.angle", "solver.message"])
 @pytest.mark.parametrize("command", [("info",), ("probe", "--calls", "1"), ("verify",), ("check", "--fmu")])
 def test_a_variable_without_a_name_is_a_sentence(tmp_path, linkwork, fmu, name, command):
-    with zipfile.ZipFile(fmu) as archive, zipfile.ZipFile(tmp_path / "nameless.fmu", "w") as copy:
-        for member in archive.namelist():
-            text = archive.read(member)
-            if member == "modelDescription.xml":
-                text = text.replace(f'<ScalarVariable name="{name}"'.encode(), b"<ScalarVariable")
-            copy.writestr(member, text)
-    result = linkwork(*command, "nameless.fmu")
-    assert result.exit_code == WRONG
+    named = f'<ScalarVariable name="{name}"'.encode()
+    copied(fmu, tmp_path / "nameless.fmu", lambda _, content: content.replace(named, b"<ScalarVariable"))
+    result = linkwork(*command, "nameless.fmu", code=WRONG)
     assert "nameless.fmu is not an FMU" in result.stderr
     assert "name" in result.stderr.replace("nameless", "")
 
@@ -445,7 +403,6 @@ def test_names_of_files_need_not_be_utf_8(tmp_path, linkwork):
     odd = os.fsdecode(b"bad\xff")
     (tmp_path / f"{odd}.toml").write_text('published = "table-3.1"\nrun.stop_time = 0.01\n')
     for _ in range(2):  # the second time it knows its own files again, and writes over them
-        result = linkwork("run", f"{odd}.toml", "--no-plot")
-        assert result.exit_code == 0, result.stderr
+        linkwork("run", f"{odd}.toml", "--no-plot")
     assert [path.name for path in (tmp_path / "out").glob("*.csv")] == [f"{odd}.csv"]
     assert write_text(tmp_path / "note.md", odd).read_text() == "bad\\udcff"

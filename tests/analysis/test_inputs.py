@@ -233,7 +233,7 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: Inputs(force=(Function(force), Function(force))), "force has more than one Function"),
         (lambda: Inputs(speed=Function(force)), "needs its rate"),
         (lambda: Inputs(speed=(1.0, Function(force))), "needs its rate"),
-        (lambda: Function(3.0), "must be a function"),  # type: ignore[arg-type]
+        (lambda: Function(3.0), "must be a function"),
         (lambda: Function(force, breaks=[nan]), "finite times"),
         (lambda: steps([0.0, 0.0], [1.0, 2.0]), "must increase"),
         (lambda: table([0.0, 2.0, 1.0], [1.0, 2.0, 3.0]), "must increase"),
@@ -266,7 +266,7 @@ def test_what_is_not_usable_is_refused_with_a_sentence(make: Any, said: str) -> 
 
 def test_function_of_a_wrong_kind_of_value() -> None:
     with pytest.raises(InputError, match=r"returned None at t = 0.5 s"):
-        value(Inputs(force=Function(lambda t, th2, u, w2, v: None)), 0.5)  # type: ignore[arg-type, return-value]
+        value(Inputs(force=Function(lambda t, th2, u, w2, v: None)), 0.5)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ DEVELOPMENT = {"masters", "docs", "bench", "continuation", "mutation", "dev", "a
 def libraries(requirements: list[str]) -> set[str]:
     """Names of the modules of some requirements."""
     modules = {"pillow": "PIL", "cupy-cuda12x": "cupy"}
-    names = {re.match(r"[\w-]+", requirement)[0] for requirement in requirements}  # type: ignore[index]
+    names = {re.match(r"[\w-]+", requirement)[0] for requirement in requirements}
     return {modules.get(name, name.replace("-", "_")) for name in names} - {"linkwork"}
 
 

@@ -33,7 +33,7 @@ from linkwork.parameters import field_name
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers, Solution
 
-from .conftest import opened
+from .conftest import marked, opened, run_case
 from .test_studio import _drag, _shown, in_browser
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
@@ -47,10 +47,7 @@ PROBED = ("hybrid-press", "shaper")
 
 def run(name: str, **changes: Any) -> Trajectory:
     """Run a file of the library as it is, or with other entries."""
-    case = load_case(FOLDER / f"{name}.toml", changes)
-    return simulate(
-        case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-11
-    )
+    return run_case(load_case(FOLDER / f"{name}.toml", changes), tolerance=1e-11)
 
 
 def test_the_library_is_there():
@@ -86,9 +83,7 @@ def tables_in(path: Path) -> dict[str, Any]:
     return found
 
 
-def same_joint_forces(
-    package: Package, outputs: dict[str, float], oracle: Multipliers, solution: Solution, q: np.ndarray
-) -> None:
+def same_joint_forces(package: Package, outputs: Any, oracle: Multipliers, solution: Solution, q: Any) -> None:
     """Compare with their signs the forces in all pins, by body, and in all slides, across their lines and as moments."""
     forces = solution.forces
     scale = 1e-8 * (1.0 + max(np.abs(force).max() for force in forces.values()))
@@ -129,17 +124,11 @@ def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
     i = made.equations.apply_inputs(modes, u, p)
     commanded = {made.channels[k].freedom: 0.0 for k in made.commands({mode.name: mode.default for mode in made.modes})}
     for sample in np.linspace(1, len(found) - 1, 4).astype(int):
-        x = (
-            *(found[f.coordinate][sample] for f in made.freedoms),
-            *(found[f.rate][sample] for f in made.freedoms),
-            0.0,
-            0.0,
-        )
-        x = tuple(map(float, x))
+        names = [f.coordinate for f in made.freedoms] + [f.rate for f in made.freedoms]
+        x = (*(float(found[name][sample]) for name in names), 0.0, 0.0)
         m, q = equations.motion(x, i, p), places(made, oracle, x)
-        wanted = oracle.solve(
-            q, np.array(x[n : 2 * n]), np.zeros(n), commanded, {load.point: (0.0, 0.0) for load in d.loads}, {}
-        )
+        loads = {load.point: (0.0, 0.0) for load in d.loads}
+        wanted = oracle.solve(q, np.array(x[n : 2 * n]), np.zeros(n), commanded, loads, {})
         scale = 1.0 + np.abs(wanted.accelerations).max()
         np.testing.assert_allclose(m.accelerations, wanted.accelerations, atol=1e-8 * scale)
         np.testing.assert_allclose(m.loads, wanted.loads, atol=1e-8 * (1.0 + np.abs(wanted.loads).max()))
@@ -256,9 +245,7 @@ def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
 
 @pytest.mark.fmu
 def test_a_force_on_what_has_no_mass_is_named(tmp_path):
-    disc = linkage("massless", ground={"A": (0, 0)}).body(
-        "disc", points={"A": (0, 0), "Q": (1, 0)}, mass=1.0, cog=(0, 0)
-    )
+    disc = linkage("massless", ground={"A": (0, 0)}).body("disc", points={"A": (0, 0), "Q": (1, 0)}, mass=1, cog=(0, 0))
     made = disc.freedom("disc", "A", speed=10.0).mechanism()
     given = made.first_set.parameters, Inputs(torque=1.0)
     message = simulate(*given, stop_time=0.1).message
@@ -422,19 +409,16 @@ VIBRATING = {
     "stephenson-3": on_a_spring("stephenson-3", "D"),
 }
 #: Watt's linkage is for `make test-long`: Stephenson's has as many links and its spring at the same place.
-each_vibrating = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name == "watt-1" else ()) for name in VIBRATING]
-)
+OTHERS = [name for name in VIBRATING if name != "watt-1"]
+each_vibrating = pytest.mark.parametrize("name", [*OTHERS, *marked("long", ["watt-1"])])
 
 
 class Vibration:
     """A linkage with its oracle, that goes on for one turn of the crank from any start (free coordinates, their rates)."""
 
     def __init__(self, name: str) -> None:
-        self.made, self.oracle = (
-            Package(read_description(VIBRATING[name])).mechanism(),
-            Multipliers(read_description(VIBRATING[name])),
-        )
+        d = read_description(VIBRATING[name])
+        self.made, self.oracle = Package(d).mechanism(), Multipliers(d)
         self.parameters, self.n = self.made.first_set.parameters, len(self.made.freedoms)
 
     def of(self, orbit: Any) -> tuple[np.ndarray, float, float]:
@@ -503,19 +487,17 @@ def test_newtons_method_from_the_start_misses_places():
     made = load_linkage(FOLDER / "stephenson-2.toml")
     oracle = Multipliers(read_description(tables_in(FOLDER / "stephenson-2.toml")))
     found = reach(made)
-    wanted = np.array(
-        [places(made, oracle, (angle, 0.0)) for angle in np.linspace(found.low + 1e-6, found.high - 1e-6, 400)]
-    )
+    angles = np.linspace(found.low + 1e-6, found.high - 1e-6, 400)
+    wanted = np.array([places(made, oracle, (angle, 0.0)) for angle in angles])
     crank = wanted[:, 2]
     assert np.diff(crank).min() < 0.0 < np.diff(crank).max()
     shares = []
     oracle.freedoms = oracle.coordinate("A")
     closed = casadi.vertcat(oracle.closure, oracle.freedoms)
     oracle.joints = casadi.Function("joints", [oracle.q], [closed, casadi.jacobian(closed, oracle.q)])
+    start = places(made, oracle, (np.deg2rad(20.0), 0.0))
     for sweeps in (8, 50):
-        ends = np.array(
-            [oracle.placed(angle, places(made, oracle, (np.deg2rad(20.0), 0.0)), sweeps) for angle in crank[:, None]]
-        )
+        ends = np.array([oracle.placed(angle, start, sweeps) for angle in crank[:, None]])
         shares.append(np.mean(np.abs(ends - wanted)[:, 0::3].max(axis=1) < 1e-9))
     assert shares == pytest.approx([0.84, 0.84], abs=0.01)
 
@@ -554,24 +536,19 @@ def test_the_fmu_of_a_linkage_probes_clean(path, tmp_path):
 @in_browser
 @pytest.mark.fmu
 def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp_path):
-    found = syn.FiveBar(
-        **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
-        pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
-    )  # fmt: skip
+    found = syn.FiveBar(**FIVE_BAR, pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7))
     tables = {"linkage": description(found, syn.MachineSpec(speed=20.0)), "run": {"revolutions": 1.0}}
     case = read_case(tables, folder=FOLDER)
     file = build_native(find_mechanism(case.parameters), NATIVE, tmp_path)
-    fmu = cosimulate(
-        file, case.parameters, case.inputs, initial=case.initial, stop_time=0.3, step=0.01, tolerance=1e-11
-    )
+    given = {"initial": case.initial, "stop_time": 0.3, "step": 0.01, "tolerance": 1e-11}
+    fmu = cosimulate(file, case.parameters, case.inputs, **given)
     wanted = found.path(20.0 * fmu.time)
     np.testing.assert_allclose(np.column_stack([fmu["P.x"], fmu["P.y"]]), wanted, atol=1e-8)
     (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
     page = opened(browser, tmp_path / "page.html")
     shown = _shown(page)["columns"]
-    np.testing.assert_allclose(
-        shown["P.x"], found.path(shown["crank.angle"] - case.initial.crank_angle)[:, 0], atol=1e-9
-    )
+    wanted = found.path(shown["crank.angle"] - case.initial.crank_angle)
+    np.testing.assert_allclose(shown["P.x"], wanted[:, 0], atol=1e-9)
     page.close()
 
 
@@ -585,8 +562,8 @@ def test_ranges_of_motion():
     # there the bodies of the dyad are in line
     assert found.least == pytest.approx(LIMIT_SINE)
     # a limit more than half a turn from the start: the crank stops on either side where coupler and rocker are in line
-    swing = linkage("wide-swing", ground={"A": (0, 0), "D": ("100 mm", 0)}).body(
-        "crank", bar=("A", "B"), length="80 mm", mass=1.0
+    swing = linkage("wide-swing", ground={"A": (0, 0), "D": (0.1, 0)}).body(
+        "crank", bar=("A", "B"), length=0.08, mass=1
     )
     swing.body("coupler", bar=("B", "C"), length="90 mm").body("rocker", bar=("D", "C"), length="80 mm")
     found = reach(swing.freedom("crank", "A", start="130 deg", driven=False).mechanism())
@@ -607,9 +584,7 @@ def test_ranges_of_motion():
         assert (found.low, found.high) == pytest.approx(ends, rel=1e-5)
         assert (found.open, found.least) == ((False, False), 1e-3)
     # the block runs off along its line where the slot of the arm is parallel to it, which no place need hit
-    slotted = linkage("slotted-arm", ground={"A": (0, 0), "O": (0, "100 mm")}).body(
-        "arm", points={"A": (0, 0)}, mass=1.0
-    )
+    slotted = linkage("slotted-arm", ground={"A": (0, 0), "O": (0, 0.1)}).body("arm", points={"A": (0, 0)}, mass=1)
     slotted.body("block", points={"P": (0, 0)}, mass=1.0, inertia=1e-3).slide("G", body="block", through="O")
     slotted.slot("S", pin="P", on="arm", through="A")
     for start in (90.2, 0.2, 179.8):
@@ -647,37 +622,24 @@ def test_dead_centres():
     np.testing.assert_allclose(np.sort(seen), np.sort(at), atol=0.02)
 
 
-FOUR_BAR = {
-    "pivot_x": 0.1,
-    "pivot_y": 0.05,
-    "ground_angle": 0.3,
-    "crank_phase": 0.4,
-    "point_distance": 0.09,
-    "point_angle": 0.5,
-}
+PLACED = {"pivot_x": 0.1, "pivot_y": 0.05, "ground_angle": 0.3, "crank_phase": 0.4}
+PLACED |= {"point_distance": 0.09, "point_angle": 0.5}
+FIVE_BAR = PLACED | {"ground_length": 0.15, "crank_length": 0.05, "coupler_length": 0.16, "rocker_length": 0.15}
+FOUR_BAR = PLACED | {"ground_length": 0.2, "crank_length": 0.06, "coupler_length": 0.18, "rocker_length": 0.15}
+HALF = {"length": 0.03, "ratio": 0.5, "phase": -0.2}
 
 
 @pytest.mark.parametrize(
     "found",
     [
-        syn.Linkage(**FOUR_BAR, ground_length=0.2, crank_length=0.06, coupler_length=0.18, rocker_length=0.15, branch=-1),
-        syn.SliderCrank(**FOUR_BAR, ground_length=0.03, crank_length=0.05, coupler_length=0.16),
-        syn.SliderCrank(**FOUR_BAR, ground_length=-0.03, crank_length=0.05, coupler_length=0.16, branch=-1),
-        syn.FiveBar(
-            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
-            pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
-        ),
-        syn.FiveBar(
-            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15, branch=-1,
-            pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2),
-        ),
-        syn.FiveBar(
-            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
-            pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2, series=FourierSeries([0.0, 0.1, 0.05], [0.0, 0.2, -0.1])),
-        ),
+        syn.Linkage(**FOUR_BAR, branch=-1),
+        syn.SliderCrank(**PLACED, ground_length=0.03, crank_length=0.05, coupler_length=0.16),
+        syn.SliderCrank(**PLACED, ground_length=-0.03, crank_length=0.05, coupler_length=0.16, branch=-1),
+        syn.FiveBar(**FIVE_BAR, pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7)),
+        syn.FiveBar(**FIVE_BAR, branch=-1, pivot=syn.SecondCrank(**HALF)),
+        syn.FiveBar(**FIVE_BAR, pivot=syn.SecondCrank(**HALF, series=FourierSeries([0.0, 0.1, 0.05], [0.0, 0.2, -0.1]))),
         syn.Linkage(
-            **FOUR_BAR, ground_length=0.2, crank_length=0.06, coupler_length=0.18, rocker_length=0.15,
-            pivot=syn.SliderMotion(FourierSeries([2e-3, 4e-3, -1e-3], [0.0, 6e-3, 2e-3]), guide_angle=0.3),
+            **FOUR_BAR, pivot=syn.SliderMotion(FourierSeries([2e-3, 4e-3, -1e-3], [0.0, 6e-3, 2e-3]), guide_angle=0.3)
         ),
     ],
     ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed", "two-drives", "moved-pivot"],
@@ -687,12 +649,9 @@ def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     """Its coupler point goes where the synthesis says, over two turns."""
     make, way = syn.MachineSpec(speed=20.0), {"rotation": 0.2, "direction": direction}
     run = {"stop_time": 0.2 * np.pi, "step": 1e-3}
-    case = read_case(
-        {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}, folder=FOLDER
-    )
-    done = simulate(
-        case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-12
-    )
+    tables = {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}
+    case = read_case(tables, folder=FOLDER)
+    done = run_case(case, tolerance=1e-12)
     assert done.status == 0
     wanted = found.path(0.2 + direction * 20.0 * done.time / found.turns)
     np.testing.assert_allclose(np.column_stack([done["P.x"], done["P.y"]]), wanted, atol=1e-9)
@@ -706,10 +665,8 @@ def test_two_cranks_alone_have_tables_without_a_natural_frequency():
 
 def test_the_studio_sorts_parameters_by_their_roles():
     given = {row["name"]: row for row in mechanism_tables(load_linkage(FOLDER / "hybrid-press.toml"))["given"]}
-    sections = {
-        name: given[name]["section"] for name in ("sheet.free_position", "gravity", "rod.cog_x", "initial.motor_angle")
-    }
-    assert list(sections.values()) == ["Spring, damper, friction", "Gravity", "Masses", "Start"]
+    asked = ("sheet.free_position", "gravity", "rod.cog_x", "initial.motor_angle")
+    assert [given[name]["section"] for name in asked] == ["Spring, damper, friction", "Gravity", "Masses", "Start"]
     assert [name for name, row in given.items() if row.get("role") == "stiffness"] == ["sheet.stiffness"]
 
 
@@ -720,10 +677,8 @@ def test_motions_in_different_units_have_charts_of_their_own():
     built.freedom("cart", "G", driven=False).freedom("arm", "P", driven=False)
     tables = mechanism_tables(built.mechanism())
     assert tables["described"]
-    shown = [
-        (chart["title"], chart["unit"], chart["factor"]) for chart in tables["charts"] if chart["kind"] == "motion"
-    ]
-    assert shown == [("Motion: cart position", "mm", 1e3), ("Motion: arm angle", "deg", np.rad2deg(1.0))]
+    shown = [[c[key] for key in ("title", "unit", "factor")] for c in tables["charts"] if c["kind"] == "motion"]
+    assert shown == [["Motion: cart position", "mm", 1e3], ["Motion: arm angle", "deg", np.rad2deg(1.0)]]
 
 
 @in_browser
@@ -760,15 +715,11 @@ def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
 @pytest.mark.fmu
 def test_check_of_a_linkage_whose_pin_has_friction(tmp_path):
     # at this speed a step of the run in process passed over a reversal of the friction at a tolerance of 1e-11
-    tables = {
-        "name": "wiper-arm", "ground": {"A": [0, 0], "D": ["180 mm", "20 mm"]}, "assembly": {"C": 1},
-        "bodies": {
-            "crank": {"bar": ["A", "B"], "length": "45 mm", "mass": 0.035, "inertia": 6e-6},
-            "coupler": {"bar": ["B", "C"], "length": "190 mm", "mass": 0.117, "inertia": 3.5e-4},
-            "arm": {"bar": ["D", "C"], "length": "60 mm", "mass": 0.6, "inertia": 0.02},
-        },
-        "friction": {"C": "1 mm"}, "freedoms": {"crank": {"joint": "A", "speed": "45 rpm"}},
-    }  # fmt: skip
-    case = read_case({"linkage": tables, "drive": {"speed": "39 rpm"}}, folder=FOLDER)
+    ground, more = {"A": (0, 0), "D": ("180 mm", "20 mm")}, {"assembly": {"C": 1}, "friction": {"C": "1 mm"}}
+    wiper = linkage("wiper-arm", ground=ground, **more).freedom("crank", "A", speed="45 rpm")
+    wiper.body("crank", bar=("A", "B"), length="45 mm", mass=0.035, inertia=6e-6)
+    wiper.body("coupler", bar=("B", "C"), length="190 mm", mass=0.117, inertia=3.5e-4)
+    wiper.body("arm", bar=("D", "C"), length="60 mm", mass=0.6, inertia=0.02)
+    case = read_case({"linkage": wiper.tables, "drive": {"speed": "39 rpm"}}, folder=FOLDER)
     file = build_native(find_mechanism(case.parameters), NATIVE, tmp_path)
     assert check(file, case, interface="model-exchange")[2].agrees

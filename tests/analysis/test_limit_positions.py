@@ -38,7 +38,7 @@ def rate(linkage: syn.Linkage, rotation: float) -> float:
     return float(behind - ahead) / 2e-6
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(four_bars())
 def test_the_rocker_rests_in_its_dead_centres_and_nowhere_else(linkage: syn.Linkage) -> None:
     rests = syn.dead_centres(linkage)
@@ -57,7 +57,7 @@ def test_the_rocker_rests_in_its_dead_centres_and_nowhere_else(linkage: syn.Link
         assert min(away, default=pi) < 0.01
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(four_bars())
 def test_the_crank_goes_to_its_toggles(linkage: syn.Linkage) -> None:
     found = syn.toggles(linkage)
@@ -69,7 +69,7 @@ def test_the_crank_goes_to_its_toggles(linkage: syn.Linkage) -> None:
         assert min(abs((end - at + pi) % (2.0 * pi) - pi) for at in found) < 0.01
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(four_bars(), st.floats(0.0, 6.0))
 def test_the_advantage_is_the_ratio_of_speeds(linkage: syn.Linkage, rotation: float) -> None:
     assume(np.isfinite(linkage.path([rotation])).all())
@@ -105,13 +105,13 @@ def test_a_time_ratio_is_kept_by_the_search() -> None:
     free = syn.synthesize(task, constraints=wanted[1:], search=syn.QUICK_SEARCH).best
     held = syn.synthesize(task, constraints=wanted, search=syn.QUICK_SEARCH).best
     ratio = syn.time_ratio(held.linkage)
-    assert ratio is not None
     assert 1.25 - 1e-6 <= ratio <= 1.4 + 1e-6
     assert held.error > free.error
 
 
 PHI = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
 SWING = syn.RockerFunction(angle=1.6 + 0.6 * np.cos(PHI), rotation=PHI, mounting=True)
+LOOP = syn.UntimedPath(path=syn.TargetPath(points=np.column_stack([np.cos(PHI), 0.5 * np.sin(PHI)]), closed=True))
 WAY = np.linspace(0.0, radians(100.0), 11)
 PART = syn.RockerFunction(angle=1.0 + 0.3 * WAY**2, rotation=WAY, mounting=True)
 CLEAR, ANY = syn.LeastTransmission(angle=0.5), syn.LeastTransmission(angle=0.0, over="task")
@@ -132,13 +132,7 @@ def solutions(task: Any, *constraints: Any) -> tuple[syn.Solution, ...]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "task",
-    [
-        SWING,
-        syn.UntimedPath(path=syn.TargetPath(points=np.column_stack([np.cos(PHI), 0.5 * np.sin(PHI)]), closed=True)),
-    ],
-)
+@pytest.mark.parametrize("task", [SWING, LOOP])
 def test_a_least_advantage_holds_all_the_way(task: Any) -> None:
     turn = np.linspace(0.0, 2.0 * pi, 2881)
     constraints = (CLEAR, syn.LargestLink(length=4.0)) if isinstance(task, syn.UntimedPath) else (CLEAR,)
@@ -218,29 +212,14 @@ def test_what_is_not_usable_is_refused(made: Any, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("task", "constraint", "error", "message"),
+    ("task", "constraint", "message"),
     [
-        (SWING, syn.Toggle(at=1.0), syn.InfeasibleError, "cannot turn fully"),
-        (
-            syn.SliderFunction(position=[0.0, 1.0, 0.5]),
-            syn.MechanicalAdvantage(greatest=9.0),
-            syn.InfeasibleError,
-            "rests twice",
-        ),
-        (
-            syn.UntimedPath(path=syn.TargetPath(points=[[0, 0], [1, 0], [1, 1]], closed=True)),
-            syn.DeadCentre(at=1.0),
-            InputError,
-            "gives none",
-        ),
-        (
-            syn.UntimedPath(path=syn.TargetPath(points=[[0, 0], [1, 0], [1, 1]], closed=True)),
-            syn.MechanicalAdvantage(least=1.0, at=[0.3]),
-            InputError,
-            "gives none",
-        ),
+        (SWING, syn.Toggle(at=1.0), "cannot turn fully"),
+        (syn.SliderFunction(position=[0.0, 1.0, 0.5]), syn.MechanicalAdvantage(greatest=9.0), "rests twice"),
+        (LOOP, syn.DeadCentre(at=1.0), "gives none"),
+        (LOOP, syn.MechanicalAdvantage(least=1.0, at=[0.3]), "gives none"),
     ],
 )
-def test_what_contradicts_the_task_is_refused(task: Any, constraint: Any, error: Any, message: str) -> None:
-    with pytest.raises(error, match=message):
+def test_what_contradicts_the_task_is_refused(task: Any, constraint: Any, message: str) -> None:
+    with pytest.raises((InputError, syn.InfeasibleError), match=message):
         solutions(task, syn.FullTurn(), constraint)

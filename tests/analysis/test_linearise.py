@@ -15,18 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
-from analysis import InductionMotor, Inputs, figures, ramp
-from analysis.linear import (
-    LEAST_SAMPLES,
-    EquilibriumError,
-    LinearModelError,
-    design_pid,
-    find_equilibria,
-    find_equilibrium,
-    linear_outputs,
-    linearise,
-    linearise_orbit,
-)
+from analysis import InductionMotor, Inputs, figures, linear, ramp
+from analysis.linear import EquilibriumError, find_equilibria, find_equilibrium, linearise, linearise_orbit
 from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics.tracing import rebind_functions
@@ -41,7 +31,7 @@ pytest.importorskip("casadi")
 
 SPEED = SETS["table-3.1"].crank_speed
 TURNING = Inputs(speed=SPEED)
-LINEAR_OUTPUTS = linear_outputs(FIVE_BAR)
+LINEAR_OUTPUTS = linear.linear_outputs(FIVE_BAR)
 TORQUE_INPUTS = ("drive.torque", "slider.force", "load.fx", "load.fy")
 SPEED_INPUTS = ("slider.force", "load.fx", "load.fy", "drive.acceleration", "drive.speed", "crank.angle")
 #: Far below every value, so that a complex step has no error but rounding.
@@ -114,9 +104,8 @@ def test_second_order_form_is_that_of_complex_steps(seed: int) -> None:
     assert_near(model.C, complex_step(lambda r: residual(q, r, qdd, i, p), qd))
     assert_near(model.K, complex_step(lambda c: residual(c, qd, qdd, i, p), q))
     names = ("torque", "force", "load_x", "load_y")
-    forces = complex_step(
-        lambda w: residual(q, qd, qdd, i._replace(**dict(zip(names, w))), p), [getattr(i, name) for name in names]
-    )
+    acting = [getattr(i, name) for name in names]
+    forces = complex_step(lambda w: residual(q, qd, qdd, i._replace(**dict(zip(names, w))), p), acting)
     assert_near(model.F, -forces)
     assert model.M[0, 1] == model.M[1, 0]
 
@@ -140,32 +129,22 @@ FUNCTIONS = {
 }
 
 
+@pytest.mark.parametrize("drive", ["torque", "speed"])
 @pytest.mark.parametrize("seed", range(25))
-def test_first_order_form_and_outputs_are_those_of_complex_steps_in_torque_drive(seed: int) -> None:
-    case = rough(seed, "torque") if seed % 2 else seeded(seed)
-    p, x, i = case.parameters.constants(), case.state, case.torque_inputs
+def test_first_order_form_and_outputs_are_those_of_complex_steps(seed: int, drive: str) -> None:
+    case = rough(seed, drive) if seed % 2 else seeded(seed)
+    p, x, i = case.parameters.constants(), case.state, case.inputs(drive)
     model = linearise(case.parameters, x, as_inputs(x, i))
+    free, names = ([0, 1, 2, 3], TORQUE_INPUTS) if drive == "torque" else ([1, 3], SPEED_INPUTS)
+    assert (2 * len(model.M), model.input_names) == (len(free), names)
+    acting = ("force", "load_x", "load_y")
+    acting = ("torque", *acting) if drive == "torque" else (*acting, "acceleration", "speed", "angle")
     for f, state, inputs in (("derivative", model.A, model.B), ("outputs", model.H, model.D)):
-        assert_near(state, by_state(FUNCTIONS[f], x, i, p))
-        columns = by_inputs(FUNCTIONS[f], x, i, p)
-        assert_near(inputs, np.column_stack([columns[n] for n in ("torque", "force", "load_x", "load_y")]))
-    assert model.input_names == TORQUE_INPUTS
-
-
-@pytest.mark.parametrize("seed", range(25))
-def test_first_order_form_and_outputs_are_those_of_complex_steps_in_speed_drive(seed: int) -> None:
-    case = rough(seed, "speed") if seed % 2 else seeded(seed)
-    p, x, i = case.parameters.constants(), case.state, case.speed_inputs
-    model = linearise(case.parameters, x, as_inputs(x, i))
-    assert (model.M.shape, model.input_names) == ((1, 1), SPEED_INPUTS)
-    for f, state, inputs in (("derivative", model.A, model.B), ("outputs", model.H, model.D)):
-        whole, columns = by_state(FUNCTIONS[f], x, i, p), by_inputs(FUNCTIONS[f], x, i, p)
-        exact = np.column_stack(
-            [columns[n] for n in ("force", "load_x", "load_y", "acceleration")] + [whole[:, 2], whole[:, 0]]
-        )
-        rows = [1, 3] if f == "derivative" else slice(None)
-        assert_near(state, whole[rows][:, [1, 3]])
-        assert_near(inputs, exact[rows])
+        whole = by_state(FUNCTIONS[f], x, i, p)
+        columns = by_inputs(FUNCTIONS[f], x, i, p) | {"speed": whole[:, 2], "angle": whole[:, 0]}
+        rows = free if f == "derivative" else slice(None)
+        assert_near(state, whole[rows][:, free])
+        assert_near(inputs, np.column_stack([columns[name] for name in acting])[rows])
 
 
 def test_the_outputs_at_the_point_are_the_plants() -> None:
@@ -306,33 +285,6 @@ def test_a_neutral_equilibrium_is_found_and_not_called_stable() -> None:
     assert not one.stable
 
 
-def test_no_equilibrium_is_reported() -> None:
-    loose = replace(TABLE_3_1, gravity=0.0, slider_stiffness=0.0)
-    with pytest.raises(EquilibriumError, match=r"no equilibrium under force 5"):
-        find_equilibrium(loose, Inputs(force=5.0))
-    with pytest.raises(EquilibriumError, match=r"no equilibrium with crank\.angle = 0.3 under force 5"):
-        find_equilibrium(loose, Inputs(force=5.0), held={"crank.angle": 0.3})
-    with pytest.raises(EquilibriumError, match=r"imbalance of 0.25 N.m is left"):
-        find_equilibrium(loose, Inputs(force=5.0), held={"crank.angle": 0.3}, guess=(0.0, 0.0))
-
-
-def test_bad_statics_are_reported() -> None:
-    with pytest.raises(InputError, match="both torque and speed"):
-        find_equilibrium(TABLE_3_1, Inputs(torque=1.0), held={"crank.angle": 0.0})
-    with pytest.raises(InputError, match=r"crank\.angle is inf"):
-        find_equilibrium(TABLE_3_1, held={"crank.angle": float("inf")})
-    with pytest.raises(InputError, match=r"slider\.position.*crank\.angle"):
-        find_equilibrium(TABLE_3_1, held={"slider.position": 0.0})
-    with pytest.raises(InputError, match=r"command drive\.speed 4, but in the state it is 0"):
-        find_equilibrium(TABLE_3_1, Inputs(speed=4.0))
-    with pytest.raises(InputError, match="constant"):
-        find_equilibrium(TABLE_3_1, Inputs(force=ramp(0.0, 1.0, 0.0, 1.0)))
-    with pytest.raises(InputError, match="2 finite numbers"):
-        find_equilibrium(TABLE_3_1, guess=(0.0,))
-    with pytest.raises(AssemblyError, match="cannot be joined"):
-        find_equilibrium(TABLE_3_1, guess=(0.0, 1.0))
-
-
 # periodic motions
 
 
@@ -366,14 +318,11 @@ def test_multipliers_of_a_motor_drive() -> None:
     closed = along.A.copy()
     closed[:, :, 2] += along.B[:, :, 0] * np.imag(torque(w2 + 1e-30j) / 1e-30)[:, None]
     a = along.interpolate(closed)
-    end = solve_ivp(
-        lambda t, y: (a(t) @ y.reshape(4, 4)).ravel(),
-        (0.0, along.period),
-        np.eye(4).ravel(),
-        method="DOP853",
-        rtol=1e-11,
-        atol=1e-13,
-    ).y[:, -1]
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return (a(t) @ y.reshape(4, 4)).ravel()
+
+    end = solve_ivp(rates, (0.0, along.period), np.eye(4).ravel(), method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     values = np.linalg.eigvals(end.reshape(4, 4))
     values = values[np.argsort(np.abs(values - 1.0))]
     # along the motion nothing dies out; across it, the multipliers of the section
@@ -394,54 +343,47 @@ def test_the_samples_are_models_and_their_mean_is_the_mean(turning) -> None:
 
 # refusals
 
-
-def test_names_that_there_are_not(turning) -> None:
-    model = turning.mean()
-    with pytest.raises(UnknownNameError, match=r"slider\.position"):
-        model.to_state_space(("slider.positon",))
-    with pytest.raises(UnknownNameError, match=r"there is no drive\.torque"):
-        model.to_state_space(inputs=("drive.torque",))
-    with pytest.raises(LinearModelError, match="an integral over the run"):
-        model.to_state_space(("energy.supplied",))
-    with pytest.raises(LinearModelError, match="zero everywhere"):
-        model.to_state_space(("closure.residual",))
+LOOSE, DRY = replace(TABLE_3_1, gravity=0.0, slider_stiffness=0.0), replace(TABLE_3_1, slider_coulomb_friction=0.5)
+ZERO, PUSHED, AT = (0.0,) * 4, Inputs(force=5.0), {"crank.angle": 0.3}
 
 
-def test_bad_states_are_reported() -> None:
-    with pytest.raises(InputError, match="shape"):
-        linearise(TABLE_3_1, (0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="not finite"):
-        linearise(TABLE_3_1, (0.0, 0.0, np.nan, 0.0))
-    with pytest.raises(InputError, match=r"command drive\.speed 1, but in the state it is 0"):
-        linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.0), Inputs(speed=1.0))
-    with pytest.raises(InputError, match="has no input 'axial_force'"):
-        linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.0), Inputs(axial_force=1.0))
-    with pytest.raises(AssemblyError):
-        linearise(TABLE_3_1, (0.0, 1.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="linearise_orbit"):
-        linearise(TABLE_3_1, np.zeros((2, 4)))
-
-
-def test_bad_motions_are_reported(turning) -> None:
-    states = turning.states
-    with pytest.raises(InputError, match=f"at least {LEAST_SAMPLES}"):
-        linearise_orbit(TABLE_3_1, states[:5], TURNING)
-    with pytest.raises(InputError, match="evenly spaced"):
-        linearise_orbit(TABLE_3_1, np.vstack([states, states[:1]]), TURNING)
-    with pytest.raises(InputError, match="evenly spaced"):
-        linearise_orbit(TABLE_3_1, states, TURNING, period=2.0 * turning.period)
-    with pytest.raises(InputError, match="period must be given"):
-        linearise_orbit(TABLE_3_1, states)
-    with pytest.raises(InputError, match=r"period is -1\.0 s"):
-        linearise_orbit(TABLE_3_1, states, TURNING, period=-1.0)
-    # dry friction passes between the samples, or is hit by one of them
-    dry = replace(TABLE_3_1, slider_coulomb_friction=0.5)
-    with pytest.raises(InputError, match=r"128 samples do not resolve .* leave out dry friction"):
-        linearise_orbit(dry, find_orbit(dry, speed=SPEED))
-    with pytest.raises(InputError, match="must be numbers in SI"):
-        linearise(TABLE_3_1, ["30 deg", 0.0, 0.0, 0.0])
-    with pytest.raises(InputError, match="2 finite numbers"):
-        find_equilibrium(TABLE_3_1, guess=["30 deg", 0.0])
+@pytest.mark.parametrize(
+    ("ask", "error", "said"),
+    [
+        (lambda _: find_equilibrium(LOOSE, PUSHED), EquilibriumError, r"under force 5"),
+        (lambda _: find_equilibrium(LOOSE, PUSHED, held=AT), EquilibriumError, "angle = 0.3 under force"),
+        (lambda _: find_equilibrium(LOOSE, PUSHED, held=AT, guess=(0.0, 0.0)), EquilibriumError, "0.25 N.m is left"),
+        (lambda _: find_equilibrium(TABLE_3_1, Inputs(torque=1.0), held=AT), InputError, "both torque and speed"),
+        (lambda _: find_equilibrium(TABLE_3_1, held={"crank.angle": np.inf}), InputError, r"crank\.angle is inf"),
+        (lambda _: find_equilibrium(TABLE_3_1, held={"slider.position": 0.0}), InputError, r"slider\.p.*crank\.angle"),
+        (lambda _: find_equilibrium(TABLE_3_1, Inputs(speed=4.0)), InputError, "speed 4, but in the state it is 0"),
+        (lambda _: find_equilibrium(TABLE_3_1, Inputs(force=ramp(0.0, 1.0, 0.0, 1.0))), InputError, "constant"),
+        (lambda _: find_equilibrium(TABLE_3_1, guess=(0.0,)), InputError, "2 finite numbers"),
+        (lambda _: find_equilibrium(TABLE_3_1, guess=["30 deg", 0.0]), InputError, "2 finite numbers"),
+        (lambda _: find_equilibrium(TABLE_3_1, guess=(0.0, 1.0)), AssemblyError, "cannot be joined"),
+        (lambda a: a.mean().to_state_space(("slider.positon",)), UnknownNameError, r"slider\.position"),
+        (lambda a: a.mean().to_state_space(inputs=("drive.torque",)), UnknownNameError, r"no drive\.torque"),
+        (lambda a: a.mean().to_state_space(("energy.supplied",)), linear.LinearModelError, "an integral over"),
+        (lambda a: a.mean().to_state_space(("closure.residual",)), linear.LinearModelError, "zero everywhere"),
+        (lambda _: linearise(TABLE_3_1, (0.0, 0.0, 0.0)), InputError, "shape"),
+        (lambda _: linearise(TABLE_3_1, (0.0, 0.0, np.nan, 0.0)), InputError, "not finite"),
+        (lambda _: linearise(TABLE_3_1, ["30 deg", 0.0, 0.0, 0.0]), InputError, "must be numbers in SI"),
+        (lambda _: linearise(TABLE_3_1, ZERO, Inputs(speed=1.0)), InputError, "speed 1, but in the state it is 0"),
+        (lambda _: linearise(TABLE_3_1, ZERO, Inputs(axial_force=1.0)), InputError, "has no input 'axial_force'"),
+        (lambda _: linearise(TABLE_3_1, (0.0, 1.0, 0.0, 0.0)), AssemblyError, "cannot be joined"),
+        (lambda _: linearise(TABLE_3_1, np.zeros((2, 4))), InputError, "linearise_orbit"),
+        (lambda a: linearise_orbit(TABLE_3_1, a.states[:5], TURNING), InputError, f"at least {linear.LEAST_SAMPLES}"),
+        (lambda a: linearise_orbit(TABLE_3_1, a.states[[*range(len(a)), 0]], TURNING), InputError, "evenly"),
+        (lambda a: linearise_orbit(TABLE_3_1, a.states, TURNING, period=2.0 * a.period), InputError, "evenly"),
+        (lambda a: linearise_orbit(TABLE_3_1, a.states), InputError, "period must be given"),
+        (lambda a: linearise_orbit(TABLE_3_1, a.states, TURNING, period=-1.0), InputError, r"period is -1\.0 s"),
+        # dry friction passes between the samples, or is hit by one of them
+        (lambda _: linearise_orbit(DRY, find_orbit(DRY, speed=SPEED)), InputError, "128 samples .* out dry friction"),
+    ],
+)
+def test_what_is_not_usable_is_refused(turning, ask, error, said) -> None:
+    with pytest.raises(error, match=said):
+        ask(turning)
 
 
 # for python-control, and drawn
@@ -476,7 +418,7 @@ def test_margins_are_marked_where_the_loop_has_them(gain: float) -> None:
 
 
 def test_the_plot_of_a_design_has_its_margins(turning) -> None:
-    design = design_pid(turning.mean(), bandwidth=150.0)
+    design = linear.design_pid(turning.mean(), bandwidth=150.0)
     above, _ = figures.plot(design, title="PID").axes
     (words,) = [text.get_text() for text in above.get_legend().get_texts()]
     assert f"phase margin {np.degrees(design.phase_margin):.1f} deg" in words

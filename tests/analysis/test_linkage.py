@@ -30,7 +30,7 @@ def moved(linkage: Linkage) -> Linkage:
 
 class TestAgainstThePlant:
     @pytest.mark.parametrize("slides", [False, True])
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(linkage=linkages())
     def test_path_and_angles_are_the_plants_turned_and_shifted(self, slides: bool, linkage: Linkage) -> None:
         if slides:
@@ -54,25 +54,19 @@ class TestAgainstThePlant:
             angle = kinematics.transmission_angle(g, p)
             assert transmission[k] == pytest.approx(min(angle, pi - angle), abs=1e-12)
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(linkage=linkages(), phi=st.floats(-7.0, 7.0))
     def test_pins_are_as_far_apart_as_the_links_are_long(self, linkage: Linkage, phi: float) -> None:
         linkage = replace(moved(linkage), branch=-linkage.branch)
         z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
-        for ends, length in (
-            ("AB", linkage.crank_length),
-            ("BC", linkage.coupler_length),
-            ("CD", linkage.rocker_length),
-            ("AE", linkage.ground_length),
-            ("BP", linkage.point_distance),
-        ):
-            assert abs(z[ends[0]] - z[ends[1]]) == pytest.approx(length, rel=1e-12)
+        links = {"AB": "crank_length", "BC": "coupler_length", "CD": "rocker_length", "AE": "ground_length"}
+        for (begin, end), name in (links | {"BP": "point_distance"}).items():
+            assert abs(z[begin] - z[end]) == pytest.approx(getattr(linkage, name), rel=1e-12)
         assert complex(*linkage.path([phi])[0]) == pytest.approx(z["P"], abs=1e-12)
         # branch: C to the left of B -> D
         side = ((z["D"] - z["B"]).conjugate() * (z["C"] - z["B"])).imag
         assert np.sign(side) == linkage.branch
         # the slider travels along its guide
-        assert isinstance(linkage.pivot, SliderMotion)
         travel = (z["D"] - z["E"]) * np.exp(-1j * (linkage.ground_angle + linkage.pivot.guide_angle))
         assert travel == pytest.approx(linkage.pivot.series(phi), abs=1e-12)
 
@@ -88,9 +82,8 @@ class TestAgainstThePlant:
 
 class TestSecondCrank:
     def test_the_rocker_pivot_goes_round_it(self) -> None:
-        pivot = SecondCrank(
-            0.05, ratio=2.0, phase=0.4, series=FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2]))
-        )
+        series = FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2]))
+        pivot = SecondCrank(0.05, ratio=2.0, phase=0.4, series=series)
         linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.05).with_pivot(pivot)
         for phi in (0.0, 1.3, 5.0):
             z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
@@ -124,7 +117,7 @@ class TestGrashof:
     def test_types(self, type_: str) -> None:
         assert four_bar(*TYPES[type_]).grashof == type_
 
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=150)
     @given(lengths=st.tuples(*[st.floats(0.1, 1.0)] * 4))
     def test_the_type_says_which_links_turn(self, lengths: tuple[float, float, float, float]) -> None:
         """By brute force: a link turns fully against its neighbour if the other two can close every gap."""
@@ -142,19 +135,9 @@ class TestGrashof:
         crank, rocker = turns(l2, l1, l3, l4), turns(l4, l1, l3, l2)
         coupler = turns(l3, l2, l4, l1)
         assert linkage.turns_fully == crank
-        assert (
-            linkage.grashof
-            == {
-                (True, True, False): "drag-link",
-                (True, True, True): "drag-link",
-                (True, False, True): "crank-rocker",
-                (True, False, False): "crank-rocker",
-                (False, True, True): "rocker-crank",
-                (False, True, False): "rocker-crank",
-                (False, False, True): "double-rocker",
-                (False, False, False): "triple-rocker",
-            }[crank, rocker, coupler]
-        )
+        neither = "double-rocker" if coupler else "triple-rocker"
+        names = {(True, True): "drag-link", (True, False): "crank-rocker", (False, True): "rocker-crank"}
+        assert linkage.grashof == names.get((crank, rocker), neither)
 
 
 ANGLES = np.linspace(0.0, 2.0 * pi, 721)
@@ -162,7 +145,7 @@ ANGLES = np.linspace(0.0, 2.0 * pi, 721)
 
 class TestTransmission:
     @pytest.mark.parametrize("slides", [False, True])
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(linkage=linkages())
     def test_range_is_what_dense_sampling_finds(self, slides: bool, linkage: Linkage) -> None:
         if slides:
@@ -275,9 +258,7 @@ class TestFiveBar:
             (0.0, 1.0, ((0.0, 0.35, 0.0),)),
         ],
     )
-    def test_the_coupler_reaches_its_point(
-        self, distance: float, angle: float, bars: tuple[tuple[float, float, float], ...]
-    ) -> None:
+    def test_the_coupler_reaches_its_point(self, distance: float, angle: float, bars: Any) -> None:
         p = self.bars(replace(self.LINKAGE, point_distance=distance, point_angle=angle))
         mass, centre, inertia = self.integrated(*bars)
         own = p.coupler_cog_distance * np.exp(1j * p.coupler_cog_angle)
@@ -295,9 +276,7 @@ class TestFiveBar:
         values = []
         for phi in (0.0, 1.0, 2.5):
             z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
-            height = sum(
-                line * abs(z[a] - z[b]) * 0.5 * (z[a] + z[b]).imag for a, b in (("A", "B"), ("B", "C"), ("C", "D"))
-            )
+            height = sum(line * abs(z[a] - z[b]) * 0.5 * (z[a] + z[b]).imag for a, b in ("AB", "BC", "CD"))
             state = (phi + linkage.crank_phase, 0.0, 0.0, 0.0, 0.0, 0.0)
             values.append(dynamics.energy(state, p.constants()) - 9.81 * height)
         np.testing.assert_allclose(values, values[0], atol=1e-12)
@@ -335,10 +314,7 @@ class TestMovedPivots:
             ({"length": -0.1}, "second_crank_length is -0.1"),
             ({"length": 0.0}, "second_crank_length is 0.0"),
             ({"length": np.inf}, "second_crank_length is inf"),
-            (
-                {"length": 0.1, "ratio": 1.51},
-                "ratio of the second crank is 1.51: it must be a ratio of whole numbers up to 6",
-            ),
+            ({"length": 0.1, "ratio": 1.51}, "ratio of the second crank is 1.51: .* whole numbers up to 6"),
             ({"length": 0.1, "ratio": np.nan}, "ratio of the second crank is nan"),
             ({"length": 0.1, "phase": np.nan}, "second_crank_phase is nan"),
         ],

@@ -29,10 +29,7 @@ def test_a_run_at_a_late_time_is_the_run_at_zero(what: str) -> None:
 
 
 def test_steps_that_times_cannot_resolve_are_refused() -> None:
-    with pytest.raises(
-        InputError,
-        match=r"step is 1e-08 s, but floating-point times near 1e\+09 s are 1\.19e-07 s apart: it must be at ",
-    ):
+    with pytest.raises(InputError, match=r"step is 1e-08 s, but .* times near 1e\+09 s are 1\.19e-07 s apart"):
         sample_times(1e9 + 1e-6, 1e-8, 1e9)
 
 
@@ -68,14 +65,10 @@ def test_a_billion_turns_behind_it_do_not_change_a_run(mechanism: str, tolerance
 @pytest.mark.parametrize("ratio", [2.0, 0.5, 1.0 / 3.0])
 def test_a_groove_goes_on_in_its_place(ratio: float) -> None:
     parameters, start = OFFSET_CASE
-    run = simulate(
-        replace(parameters, groove_amplitude=0.1, groove_ratio=ratio),
-        Inputs(speed=5.0, groove=True),
-        initial=replace(start, crank_angle=1501.0 * TURN),
-        stop_time=2.0,
-        step=0.02,
-    )
-    assert run["crank.angle"] == pytest.approx(1501.0 * TURN + 5.0 * run.time, abs=1e-9)
+    grooved, late = replace(parameters, groove_amplitude=0.1, groove_ratio=ratio), 1501.0 * TURN
+    initial = replace(start, crank_angle=late)
+    run = simulate(grooved, Inputs(speed=5.0, groove=True), initial=initial, stop_time=2.0, step=0.02)
+    assert run["crank.angle"] == pytest.approx(late + 5.0 * run.time, abs=1e-9)
     assert run["shift.position"] == pytest.approx(0.1 * np.sin(ratio * run["crank.angle"]), abs=1e-10)
 
 

@@ -468,7 +468,7 @@ def test_the_command_line_joins_a_cluster(cluster: Any, linkwork: Callable[..., 
         ("processes", ("--jobs", 2)),
         ("there", ("--scheduler", cluster.scheduler_address)),
     ):
-        assert linkwork(*command, folder, *options).exit_code == 0
+        linkwork(*command, folder, *options)
     assert cluster.scheduler.transition_counter > before
     names = sorted(path.name for path in Path("here").glob("*.csv"))
     assert len(names) == 2
@@ -481,6 +481,5 @@ def test_a_scheduler_that_does_not_answer_is_a_sentence(
 ) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("analysis.cli.common._PATIENCE", 0.2)
-    result = linkwork("slider-crank", "tolerances", "--scheduler", "tcp://127.0.0.1:1")
-    assert result.exit_code == 2
+    result = linkwork("slider-crank", "tolerances", "--scheduler", "tcp://127.0.0.1:1", code=2)
     assert "no scheduler of Dask answers at tcp://127.0.0.1:1" in " ".join(result.stderr.split())
