@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from math import cos, hypot, pi, sqrt
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from analysis.synthesis import LENGTHS, Linkage, turn
+from analysis.synthesis import LENGTHS, Linkage, TargetPath, UntimedPath, turn
 
 #: A crank-rocker for tests that move its rocker pivot.
 BASE = Linkage(
@@ -20,6 +21,11 @@ def ellipse(n: int) -> NDArray[np.float64]:
     """Return the thesis's first target, an ellipse of 20 cm by 10 cm, at n equal steps of the crank; shape (n, 2) in m."""
     phi = turn(n)
     return np.column_stack([0.20 + 0.10 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
+
+
+def outline(points: Any, *, closed: bool = True, **settings: Any) -> UntimedPath:
+    """Return the task of a path without times through the points, closed unless it is said otherwise."""
+    return UntimedPath(path=TargetPath(points=points, closed=closed), **settings)
 
 
 def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:

@@ -130,8 +130,6 @@ def test_a_run_says_whose_masses_it_has():
 
 
 def test_lengths_with_a_thesis_masses_are_noted_at_the_shell(linkwork):
-    result = linkwork(
-        "run", "--published", "table-3.1", "--set", "crank.length=0.04", "--no-plot", "--stop-time", "0.01"
-    )
+    result = linkwork("run", "--published", "table-3.1", "--set", "crank.length=0.04", "--no-plot", "--stop-time", 0.01)
     assert "crank.length is 40 mm where table-3.1 has 50 mm" in result.stderr
     assert "masses: " in result.output

@@ -91,10 +91,9 @@ def test_two_springs_and_gravity_over_a_turn_of_the_crank(tmp_path: Path) -> Non
         return float(springs + 6.0 * 9.81 * 0.2 * np.sin(lever))
 
     inertia, wanted = 0.05 + 6.0 * 0.2**2, []
+    tight = {"method": "bounded", "options": {"xatol": 1e-10}}
     for crank in 2.0 * pi * np.arange(36) / 36:
-        rest = minimize_scalar(
-            potential, bounds=(1.2, 1.9), args=(crank,), method="bounded", options={"xatol": 1e-10}
-        ).x
+        rest = minimize_scalar(potential, bounds=(1.2, 1.9), args=(crank,), **tight).x
         h = 1e-4
         second = (potential(rest + h, crank) - 2.0 * potential(rest, crank) + potential(rest - h, crank)) / h**2
         wanted.append(sqrt(second / inertia))
@@ -153,9 +152,7 @@ def test_a_crank_alone_has_no_natural_frequency_and_no_basins(tmp_path: Path) ->
         with pytest.raises(InputError, match="no coordinate of the one-crank other than the held crank is free"):
             natural_modes(case.parameters, inputs)
     for name in (None, "crank.angle"):
-        with pytest.raises(
-            InputError, match="one-crank has no free coordinate other than the crank's angle, so that starts"
-        ):
+        with pytest.raises(InputError, match="one-crank has no free coordinate other than the crank's angle"):
             basins(case.parameters, Drive(torque=0.1), start=(5.0,), coordinate=name)
 
 

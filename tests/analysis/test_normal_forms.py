@@ -7,17 +7,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from analysis.periodic import (
-    Branch,
-    Crossing,
-    Drive,
-    Family,
-    confirm_form,
-    follow,
-    frequency_response,
-    newton_orbit,
-    normal_form,
-)
+from analysis import periodic
 from analysis.periodic.stability.nonlinear import Forms, form_coefficient
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
@@ -29,12 +19,12 @@ RPM = RAD_S_PER_RPM
 def test_period_doubling_of_the_logistic_map() -> None:
     """x -> r x (1 - x) at r = 3: f''^2/4 + f'''/6 = 9 (Kuznetsov, section 4.5)."""
     forms = Forms(lambda x: 3.0 * (2.0 / 3.0 + x) * (1.0 / 3.0 - x) - 2.0 / 3.0, np.array([[-1.0]]))
-    assert form_coefficient(forms, Crossing.PERIOD_DOUBLING, -1.0, 1e-3) == pytest.approx(9.0, rel=1e-6)
+    assert form_coefficient(forms, periodic.Crossing.PERIOD_DOUBLING, -1.0, 1e-3) == pytest.approx(9.0, rel=1e-6)
 
 
 def test_fold_of_a_parabola() -> None:
     forms = Forms(lambda x: x - 0.7 * x**2 + 3.0 * x**3, np.array([[1.0]]))
-    assert abs(form_coefficient(forms, Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
+    assert abs(form_coefficient(forms, periodic.Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
 
 
 def test_multilinear_forms_of_a_cubic_map() -> None:
@@ -64,7 +54,7 @@ def test_torus_of_the_delayed_logistic_map() -> None:
     """At r = 2 it is supercritical, as the radius of the closed curve beyond it confirms."""
     multiplier = 0.5 + 0.5j * sqrt(3.0)
     forms = Forms(lambda x: delayed(2.0, x), np.array([[1.0, -1.0], [1.0, 0.0]]))
-    coefficient = form_coefficient(forms, Crossing.TORUS, multiplier, 1e-3)
+    coefficient = form_coefficient(forms, periodic.Crossing.TORUS, multiplier, 1e-3)
     assert coefficient < 0.0
     r = 2.001
     place = np.array([1e-3, 0.0])
@@ -83,10 +73,10 @@ def test_torus_of_the_delayed_logistic_map() -> None:
     assert np.abs(np.array(circle)[:, 1]).max() == pytest.approx(greatest, rel=0.05)
 
 
-def branch_of(parameters: object, low: float, high: float) -> Branch:
-    orbit = newton_orbit(parameters, Drive(speed=high * RPM))
-    family = Family(parameters=parameters, drive=orbit.drive)
-    return follow(family, orbit, high * RPM, low=low * RPM, high=high * RPM, direction=-1, most_points=700)
+def branch_of(parameters: object, low: float, high: float) -> periodic.Branch:
+    orbit = periodic.newton_orbit(parameters, periodic.Drive(speed=high * RPM))
+    family = periodic.Family(parameters=parameters, drive=orbit.drive)
+    return periodic.follow(family, orbit, high * RPM, low=low * RPM, high=high * RPM, direction=-1, most_points=700)
 
 
 @pytest.mark.slow
@@ -107,24 +97,24 @@ def test_a_run_beside_each_period_doubling_does_what_its_normal_form_says(
     parameters: object, low: float, high: float, words: list[str]
 ) -> None:
     branch = branch_of(parameters, low, high)
-    forms = [normal_form(branch.family, special) for special in branch.special]
+    forms = [periodic.normal_form(branch.family, special) for special in branch.special]
     assert [form.words for form in forms] == words
     for special, form in zip(branch.special, forms):
-        assert confirm_form(branch.family, special, form).agrees(form)
+        assert periodic.confirm_form(branch.family, special, form).agrees(form)
 
 
 def test_on_which_side_of_a_fold_the_motions_are() -> None:
     parameters = SETS["rig-1-spring-b"].parameters
-    orbit = newton_orbit(parameters, Drive(speed=900.0 * RPM))
-    family = Family(parameters=parameters, drive=orbit.drive)
-    branch = follow(family, orbit, 900.0 * RPM, low=850.0 * RPM, high=1100.0 * RPM, most_points=200)
-    fold = next(s for s in branch.special if s.kind is Crossing.FOLD)
-    form = normal_form(family, fold)
+    orbit = periodic.newton_orbit(parameters, periodic.Drive(speed=900.0 * RPM))
+    family = periodic.Family(parameters=parameters, drive=orbit.drive)
+    branch = periodic.follow(family, orbit, 900.0 * RPM, low=850.0 * RPM, high=1100.0 * RPM, most_points=200)
+    fold = next(s for s in branch.special if s.kind is periodic.Crossing.FOLD)
+    form = periodic.normal_form(family, fold)
     # the branch comes from lower speeds and turns back to them
     assert form.words == "both motions at lower values"
     assert form.uncertainty < 0.01 * abs(form.coefficient)
     with pytest.raises(InputError, match="no motion from which"):
-        confirm_form(family, fold, form)
+        periodic.confirm_form(family, fold, form)
 
 
 def test_next_to_the_limit_of_assembly_the_map_is_henons() -> None:
@@ -133,12 +123,12 @@ def test_next_to_the_limit_of_assembly_the_map_is_henons() -> None:
     Of Henon's map, whose determinant is -b, the cubic coefficient of the doubling over the square of that of the fold is
     (1 + b) / (1 - b) for normed eigenvectors, which nearly agree here.
     """
-    response = frequency_response("rig-1-spring-b", "670 rpm", "1100 rpm", doublings=0)
-    found = [(s, normal_form(response.family, s)) for branch in response.branches for s in branch.special]
+    response = periodic.frequency_response("rig-1-spring-b", "670 rpm", "1100 rpm", doublings=0)
+    found = [(s, periodic.normal_form(response.family, s)) for branch in response.branches for s in branch.special]
     beside = [(s, form) for s, form in found if s.parameter < 720.0 * RPM]
     assert len(beside) == 4
     for fold, doubling in (beside[:2], beside[2:]):
-        if fold[1].kind is not Crossing.FOLD:
+        if fold[1].kind is not periodic.Crossing.FOLD:
             fold, doubling = doubling, fold
         assert fold[0].parameter == pytest.approx(doubling[0].parameter, rel=1e-8)
         b = float(doubling[0].orbit.multipliers[1].real)
@@ -146,7 +136,7 @@ def test_next_to_the_limit_of_assembly_the_map_is_henons() -> None:
         assert ratio == pytest.approx((1.0 + b) / (1.0 - b), rel=3e-2)
         assert doubling[1].words == "supercritical"
     # the branch comes down, turns back at the first, and down again at the second
-    assert [form.words for _, form in beside if form.kind is Crossing.FOLD] == [
+    assert [form.words for _, form in beside if form.kind is periodic.Crossing.FOLD] == [
         "both motions at higher values",
         "both motions at lower values",
     ]

@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis import InductionMotor, Inputs, ramp, simulate
-from analysis.periodic import (
-    Drive,
-    OrbitAssemblyError,
-    OrbitError,
-    PeriodicOrbit,
-    Stability,
-    find_orbit,
-    find_orbits,
-    largest_multipliers,
-    newton_orbit,
-)
+from analysis import InductionMotor, Inputs, periodic, ramp, simulate
 from analysis.periodic.motion.kernels import eliminate
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError, LinkworkError
@@ -48,7 +37,7 @@ ROUGH = replace(
 )  # fmt: skip
 
 
-def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:
+def plain_period(orbit: periodic.PeriodicOrbit, start: np.ndarray) -> np.ndarray:
     """y after a period by SciPy on the plain right-hand side in time, its end located at the crank angle."""
     p = orbit.parameters.constants()
     drive = orbit.drive
@@ -69,36 +58,42 @@ def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:
 
     turned.terminal = True  # type: ignore[attr-defined]
     speed = drive.speed if drive.speed is not None else float(start[2])
-    solution = solve_ivp(
-        lambda t, x: dynamics.derivative(tuple(x), inputs(x[2]), p),
-        (0.0, 3.0 * end / speed),
-        [0.0, start[0], speed, start[1], 0.0, 0.0],
-        method="DOP853",
-        rtol=1e-12,
-        atol=1e-14,
-        events=turned,
-    )
+
+    def rates(t: float, x: np.ndarray) -> dynamics.State:
+        return dynamics.derivative(tuple(x), inputs(x[2]), p)
+
+    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
+    first = [0.0, start[0], speed, start[1], 0.0, 0.0]
+    solution = solve_ivp(rates, (0.0, 3.0 * end / speed), first, events=turned, **tight)
     x = solution.y_events[0][0]
     return np.array([x[1], x[3], x[2]][: len(start)])
 
 
 def test_steady_motion_of_table_3_1_is_the_published_one() -> None:
-    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    orbit = periodic.find_orbit(TABLE_3_1, speed=SPEED)
     assert 100.0 * orbit.start[0] == pytest.approx(published.STEADY_U_CM, abs=1e-8)
     assert 100.0 * orbit.start[1] == pytest.approx(published.STEADY_U_RATE_CM_S, abs=1e-7)
     assert orbit.residual < 1e-9
-    assert orbit.verdict().stability is Stability.STABLE
+    assert orbit.verdict().stability is periodic.Stability.STABLE
 
 
 ORBITS = {
-    "Table 3.1": (TABLE_3_1, Drive(speed=SPEED), None),
-    "general": (GENERAL, Drive(speed=30.0, forces={"slider.force": 2.0, "load.fx": 1.0, "load.fy": -3.0}), None),
-    "unstable": (replace(TABLE_3_1, slider_stiffness=260.0), Drive(speed=SPEED), (-0.0475, -0.5)),
-    "motor": (TABLE_3_1, Drive(motor=MOTOR), None),
-    "torque": (SETS["rig-2-spring-c"].parameters, Drive(torque=0.01), (0.0, 0.0, 56.0)),
-    "rough": (ROUGH, Drive(speed=30.0, forces={"slider.force": 2.0, "load.fx": 1.0, "load.fy": -3.0}), None),
-    "rough torque": (ROUGH, Drive(motor=MOTOR, torque=-0.3), None),
-    "general torque": (GENERAL, Drive(motor=MOTOR, torque=-0.3, forces={"slider.force": 2.0, "load.fy": -3.0}), None),
+    "Table 3.1": (TABLE_3_1, periodic.Drive(speed=SPEED), None),
+    "general": (
+        GENERAL,
+        periodic.Drive(speed=30.0, forces={"slider.force": 2.0, "load.fx": 1.0, "load.fy": -3.0}),
+        None,
+    ),
+    "unstable": (replace(TABLE_3_1, slider_stiffness=260.0), periodic.Drive(speed=SPEED), (-0.0475, -0.5)),
+    "motor": (TABLE_3_1, periodic.Drive(motor=MOTOR), None),
+    "torque": (SETS["rig-2-spring-c"].parameters, periodic.Drive(torque=0.01), (0.0, 0.0, 56.0)),
+    "rough": (ROUGH, periodic.Drive(speed=30.0, forces={"slider.force": 2.0, "load.fx": 1.0, "load.fy": -3.0}), None),
+    "rough torque": (ROUGH, periodic.Drive(motor=MOTOR, torque=-0.3), None),
+    "general torque": (
+        GENERAL,
+        periodic.Drive(motor=MOTOR, torque=-0.3, forces={"slider.force": 2.0, "load.fy": -3.0}),
+        None,
+    ),
 }
 
 
@@ -106,17 +101,17 @@ ORBITS = {
     params=[pytest.param(name, marks=pytest.mark.slow if name == "rough torque" else ()) for name in ORBITS],
     scope="module",
 )
-def orbit(request: pytest.FixtureRequest) -> PeriodicOrbit:
+def orbit(request: pytest.FixtureRequest) -> periodic.PeriodicOrbit:
     parameters, drive, start = ORBITS[request.param]
-    return newton_orbit(parameters, drive, start=start)
+    return periodic.newton_orbit(parameters, drive, start=start)
 
 
-def test_motion_repeats_itself_on_the_plain_equations(orbit: PeriodicOrbit) -> None:
+def test_motion_repeats_itself_on_the_plain_equations(orbit: periodic.PeriodicOrbit) -> None:
     scale = np.array([0.05, 2.0, 40.0])[: len(orbit.start)]
     assert np.abs((plain_period(orbit, orbit.start) - orbit.start) / scale).max() < 1e-8 * max(1.0, orbit.largest)
 
 
-def test_monodromy_matrix_is_that_of_differences(orbit: PeriodicOrbit) -> None:
+def test_monodromy_matrix_is_that_of_differences(orbit: periodic.PeriodicOrbit) -> None:
     for j, step in enumerate((1e-6, 4e-5, 1e-3)[: len(orbit.start)]):
         aside = np.zeros(len(orbit.start))
         aside[j] = step
@@ -125,14 +120,14 @@ def test_monodromy_matrix_is_that_of_differences(orbit: PeriodicOrbit) -> None:
         assert np.abs((column - orbit.monodromy[:, j]) / size).max() < 2e-6 * max(1.0, orbit.largest)
 
 
-def test_determinant_is_liouvilles(orbit: PeriodicOrbit) -> None:
+def test_determinant_is_liouvilles(orbit: periodic.PeriodicOrbit) -> None:
     # with friction the trace has sharp peaks where the slider turns round
     samples, tolerance = (512, 1e-8) if orbit.parameters == without_friction(orbit.parameters) else (16384, 1e-6)
     exact = np.linalg.det(orbit.monodromy)
     assert orbit.determinant_by_liouville(samples) == pytest.approx(exact, rel=tolerance, abs=1e-12)
 
 
-def test_work_over_a_period_is_what_is_dissipated(orbit: PeriodicOrbit) -> None:
+def test_work_over_a_period_is_what_is_dissipated(orbit: periodic.PeriodicOrbit) -> None:
     # constant slider force and load do no work over a period
     turn = orbit.turn(4096)
     p, w = orbit.parameters.constants(), turn["crank.speed"]
@@ -143,18 +138,12 @@ def test_work_over_a_period_is_what_is_dissipated(orbit: PeriodicOrbit) -> None:
 
 
 def test_turn_is_that_of_a_run() -> None:
-    orbit = find_orbit(GENERAL, torque=MOTOR)
+    orbit = periodic.find_orbit(GENERAL, torque=MOTOR)
     turn = orbit.turn(1024)
-    run = simulate(
-        GENERAL,
-        Inputs(torque=MOTOR),
-        initial=InitialState(
-            crank_speed=orbit.start[2], slider_position=orbit.start[0], slider_velocity=orbit.start[1]
-        ),
-        stop_time=turn.period,
-        samples=np.append(turn.time, turn.period),
-        tolerance=1e-12,
-    )
+    u, v, w = orbit.start
+    start = InitialState(crank_speed=w, slider_position=u, slider_velocity=v)
+    times = {"stop_time": turn.period, "samples": np.append(turn.time, turn.period)}
+    run = simulate(GENERAL, Inputs(torque=MOTOR), initial=start, tolerance=1e-12, **times)
     for name in ("crank.angle", "slider.position", "crank.speed", "drive.applied_torque", "pin.C.fx"):
         size = np.abs(turn[name]).max()
         assert np.abs(run[name][:-1] - turn[name]).max() < 1e-7 * size, name
@@ -162,7 +151,7 @@ def test_turn_is_that_of_a_run() -> None:
 
 
 def test_two_turns_have_the_square_of_the_monodromy_matrix() -> None:
-    once, twice = (find_orbit(TABLE_3_1, speed=SPEED, turns=n) for n in (1, 2))
+    once, twice = (periodic.find_orbit(TABLE_3_1, speed=SPEED, turns=n) for n in (1, 2))
     assert twice.start == pytest.approx(once.start, abs=1e-10)
     assert twice.monodromy == pytest.approx(once.monodromy @ once.monodromy, abs=1e-9)
     assert twice.turn().harmonic("slider.position", 0.5) < 1e-12
@@ -170,13 +159,12 @@ def test_two_turns_have_the_square_of_the_monodromy_matrix() -> None:
 
 
 def test_amplitude_and_harmonics() -> None:
-    turn = find_orbit(TABLE_3_1, speed=SPEED).turn(4096)
+    turn = periodic.find_orbit(TABLE_3_1, speed=SPEED).turn(4096)
     u = turn["slider.position"]
-    assert find_orbit(TABLE_3_1, speed=SPEED).amplitude == pytest.approx(0.5 * np.ptp(u), rel=1e-6)
+    assert periodic.find_orbit(TABLE_3_1, speed=SPEED).amplitude == pytest.approx(0.5 * np.ptp(u), rel=1e-6)
     x = turn.angle
-    assert turn.harmonic("slider.position", 2) == pytest.approx(
-        2.0 * np.hypot((u * np.cos(2 * x)).mean(), (u * np.sin(2 * x)).mean()), rel=1e-12
-    )
+    cosine, sine = (u * np.cos(2 * x)).mean(), (u * np.sin(2 * x)).mean()
+    assert turn.harmonic("slider.position", 2) == pytest.approx(2.0 * np.hypot(cosine, sine), rel=1e-12)
     with pytest.raises(InputError, match=r"order 0\.5"):
         turn.harmonic("slider.position", 0.5)
     with pytest.raises(InputError, match=r"no output 'energy\.supplied'"):
@@ -184,47 +172,47 @@ def test_amplitude_and_harmonics() -> None:
 
 
 def test_newton_converges_quadratically_from_afar() -> None:
-    assert find_orbit(TABLE_3_1, speed=SPEED, start=(0.03, 1.0), settle=False).iterations < 8
+    assert periodic.find_orbit(TABLE_3_1, speed=SPEED, start=(0.03, 1.0), settle=False).iterations < 8
 
 
 def test_where_newton_fails_the_motion_itself_or_another_start_leads_there() -> None:
     soft = replace(TABLE_3_1, slider_stiffness=235.0)
-    with pytest.raises(OrbitError):
-        find_orbit(soft, speed=SPEED, start=(0.09, 3.0), settle=False)
-    assert find_orbit(soft, speed=SPEED, start=(0.09, 3.0)).verdict().stability is Stability.STABLE
+    with pytest.raises(periodic.OrbitError):
+        periodic.find_orbit(soft, speed=SPEED, start=(0.09, 3.0), settle=False)
+    assert periodic.find_orbit(soft, speed=SPEED, start=(0.09, 3.0)).verdict().stability is periodic.Stability.STABLE
 
 
 def test_where_none_is_found_the_error_says_where_it_ended() -> None:
     said = r"misses its start by .* after \d+ corrections, from slider.position = .* m, slider.velocity = .* m/s"
-    with pytest.raises(OrbitError, match=said) as caught:
-        find_orbit(replace(RIG_1_B, slider_damping=2.0), speed=1076.7 * RAD_S_PER_RPM, settle=False)
+    with pytest.raises(periodic.OrbitError, match=said) as caught:
+        periodic.find_orbit(replace(RIG_1_B, slider_damping=2.0), speed=1076.7 * RAD_S_PER_RPM, settle=False)
     assert len(caught.value.start) == 2
     assert caught.value.iterations > 0
 
 
 def test_no_periodic_motion_passes_over_a_change_point() -> None:
     speed = 40.0
-    with pytest.raises(OrbitAssemblyError, match="limit of assembly"):
-        newton_orbit(LIGHT, Drive(speed=speed))
-    assert not find_orbits(LIGHT, speed=speed).orbits
+    with pytest.raises(periodic.OrbitAssemblyError, match="limit of assembly"):
+        periodic.newton_orbit(LIGHT, periodic.Drive(speed=speed))
+    assert not periodic.find_orbits(LIGHT, speed=speed).orbits
     assert "limit of assembly" in simulate(LIGHT, Inputs(speed=speed), stop_time=7.0 / speed).message
     # without a change point the slider remains at rest
-    orbit = newton_orbit(replace(LIGHT, rocker_length=0.061), Drive(speed=speed))
+    orbit = periodic.newton_orbit(replace(LIGHT, rocker_length=0.061), periodic.Drive(speed=speed))
     assert orbit.amplitude == 0.0
     assert orbit.clearance() > 0.05
 
 
 def test_limit_of_assembly_is_an_error_of_its_own() -> None:
-    with pytest.raises(OrbitAssemblyError, match="limit of assembly") as caught:
-        find_orbit(replace(TABLE_3_1, slider_stiffness=0.0), speed=SPEED, settle=False, start=(0.1, 0.0))
+    with pytest.raises(periodic.OrbitAssemblyError, match="limit of assembly") as caught:
+        periodic.find_orbit(replace(TABLE_3_1, slider_stiffness=0.0), speed=SPEED, settle=False, start=(0.1, 0.0))
     assert isinstance(caught.value, AssemblyError)
-    with pytest.raises(OrbitAssemblyError, match="cannot be joined"):
-        find_orbit(TABLE_3_1, speed=SPEED, start=(1.0, 0.0))
+    with pytest.raises(periodic.OrbitAssemblyError, match="cannot be joined"):
+        periodic.find_orbit(TABLE_3_1, speed=SPEED, start=(1.0, 0.0))
 
 
 def test_a_crank_that_stalls_is_reported() -> None:
-    with pytest.raises(OrbitError, match="comes to rest"):
-        find_orbit(TABLE_3_1, torque=-2.0, start=(0.0, 0.0, 5.0), settle=False)
+    with pytest.raises(periodic.OrbitError, match="comes to rest"):
+        periodic.find_orbit(TABLE_3_1, torque=-2.0, start=(0.0, 0.0, 5.0), settle=False)
 
 
 @pytest.mark.parametrize(
@@ -252,23 +240,23 @@ def test_a_crank_that_stalls_is_reported() -> None:
 )
 def test_bad_input(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(LinkworkError, match=message):
-        find_orbit(TABLE_3_1, **arguments)  # type: ignore[arg-type]
+        periodic.find_orbit(TABLE_3_1, **arguments)  # type: ignore[arg-type]
 
 
 def test_row_of_orbits_is_the_orbits_one_by_one() -> None:
     stiffnesses = np.linspace(2000.0, 180.0, 40)
     rows: list[FiveBarParameters] = [replace(TABLE_3_1, slider_stiffness=k) for k in stiffnesses]
-    values, starts, status = largest_multipliers(rows, [Drive(speed=SPEED)] * len(rows))
+    values, starts, status = periodic.largest_multipliers(rows, [periodic.Drive(speed=SPEED)] * len(rows))
     good = status == 0
     # below the fold at 232.2 N/m there is none on this branch
     assert good[stiffnesses > 240.0].all()
     for i in np.flatnonzero(good)[::7]:
-        orbit = find_orbit(rows[i], speed=SPEED, start=starts[i])
+        orbit = periodic.find_orbit(rows[i], speed=SPEED, start=starts[i])
         assert values[i] == pytest.approx(orbit.largest, abs=1e-9)
         assert starts[i] == pytest.approx(orbit.start, abs=1e-10)
     assert np.isnan(values[~good]).all()
     with pytest.raises(InputError, match="kind of drive"):
-        largest_multipliers(rows[:2], [Drive(speed=SPEED), Drive(motor=MOTOR)])
+        periodic.largest_multipliers(rows[:2], [periodic.Drive(speed=SPEED), periodic.Drive(motor=MOTOR)])
 
 
 def test_a_system_without_a_solution_is_said_to_have_none() -> None:

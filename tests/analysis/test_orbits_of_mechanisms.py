@@ -35,6 +35,7 @@ from linkwork.errors import InputError, ParameterError, UnknownNameError
 from linkwork.slider_crank import published as rahman
 from linkwork.slider_crank.parameters import InitialState
 from tests.mechanisms import pendulum, rotor_on_cart
+from tests.refusals import refused
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -127,14 +128,10 @@ def test_what_is_free_names_the_components_and_the_amplitude() -> None:
     slow = newton_orbit(PENDULUM, Drive(torque=0.6), start=(30.0,))
     assert slow.swing == ("pendulum speed", "rad/s")
     assert slow.amplitude == pytest.approx(0.5 * np.ptp(slow.turn(2048)["pendulum.speed"]), rel=1e-5)
-    with pytest.raises(InputError, match=r"pendulum speed is needed: give start = \(pendulum speed\)"):
-        find_orbit(PENDULUM, torque=0.6)
-    with pytest.raises(InputError, match="no input for the speed"):
-        find_orbit(PENDULUM, speed=3.0)
-    with pytest.raises(ParameterError, match="second freedom"):
-        natural_frequency(PENDULUM)
-    with pytest.raises(UnknownNameError, match=r"there is no load\.fx"):
-        newton_orbit(ROTOR, Drive(speed=3.0, forces={"load.fx": 1.0}))
+    refused(InputError, r"pendulum speed is needed: give start = \(pendulum speed\)", find_orbit, PENDULUM, torque=0.6)
+    refused(InputError, "no input for the speed", find_orbit, PENDULUM, speed=3.0)
+    refused(ParameterError, "second freedom", natural_frequency, PENDULUM)
+    refused(UnknownNameError, r"there is no load\.fx", newton_orbit, ROTOR, Drive(speed=3.0, forces={"load.fx": 1.0}))
 
 
 def test_grid_over_cores_has_the_multipliers_of_the_linear_oscillator(tmp_path: Path) -> None:
@@ -193,14 +190,10 @@ def test_slider_crank_with_a_determined_shift_under_a_motor(how: str) -> None:
     assert orbit.drive.held == {"shift.position": 0.0889}
     assert len(orbit.start) == 1
     start = float(orbit.start[0])
-    run = simulate(
-        parameters,
-        inputs,
-        initial=replace(initial, crank_speed=start * 1.001),
-        stop_time=6.5 * orbit.turn().period,
-        step=orbit.turn().period / 2000,
-        tolerance=1e-12,
-    )
+    period = orbit.turn().period
+    times = {"stop_time": 6.5 * period, "step": period / 2000}
+    faster = replace(initial, crank_speed=start * 1.001)
+    run = simulate(parameters, inputs, initial=faster, **times, tolerance=1e-12)
     angle, speed = run["crank.angle"], run["crank.speed"]
     over = CubicHermiteSpline(angle, speed, run["crank.acceleration"] / speed)
     away = over(2.0 * pi * np.arange(3)) - start
@@ -208,8 +201,7 @@ def test_slider_crank_with_a_determined_shift_under_a_motor(how: str) -> None:
 
 
 def test_what_cannot_be_periodic_is_refused() -> None:
-    with pytest.raises(InputError, match=r"no freedom of the slider-crank is free .* axial\.force = 0"):
-        find_orbit(SPRUNG, speed=SPEED)
+    refused(InputError, r"no freedom of the slider-crank is free .* axial\.force = 0", find_orbit, SPRUNG, speed=SPEED)
     with pytest.raises(InputError, match=r"shift_speed is 0\.1: with this constant speed"):
         find_orbit(SPRUNG, Inputs(shift_speed=0.1), torque=1.0, start=(5.0,))
     grooved = replace(SPRUNG, groove_amplitude=0.05, groove_ratio=0.5)
@@ -221,8 +213,7 @@ def test_what_cannot_be_periodic_is_refused() -> None:
         ({"modes": {"axial.mode": 3}}, r"axial\.mode = 3 is not a mode"),
         ({"modes": {"drive.mode": 0}}, r"drive\.mode = 0 is not a mode"),
     ):
-        with pytest.raises(InputError, match=message):
-            newton_orbit(SPRUNG, Drive(torque=1.0, **given), start=(5.0,))
+        refused(InputError, message, newton_orbit, SPRUNG, Drive(torque=1.0, **given), start=(5.0,))
 
 
 def test_drive_and_inputs_are_each_others() -> None:
@@ -254,9 +245,8 @@ def test_stability_chart_of_the_shift() -> None:
     assert [axis.name for axis in chart.axes] == ["drive.speed", "shift.damping"]
     for row, column in ((0, 0), (5, 3)):
         x, y = chart.grid.x[column], chart.grid.y[row]
-        orbit = newton_orbit(
-            replace(SPRUNG, shift_damping=y), replace(drive, speed=x), start=chart.grid.starts[row, column]
-        )
+        damped = replace(SPRUNG, shift_damping=y)
+        orbit = newton_orbit(damped, replace(drive, speed=x), start=chart.grid.starts[row, column])
         assert chart.grid.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)
     assert len(chart.runs) >= 2
     assert all(run.confirmation.agrees for run in chart.runs)

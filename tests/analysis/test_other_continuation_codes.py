@@ -18,9 +18,8 @@ RPM = RAD_S_PER_RPM
 def oscillators(name: str) -> tuple[Family, list[float]]:
     """The family of a case in our terms: over the speed, or over the strength of the excitation at the speed 1."""
     if name == "duffing":
-        parameters = torsion.Parameters(
-            rotor_damping=0.1, rotor_stiffness=1.0, rotor_cubic_stiffness=0.04, rotor_excitation=1.0
-        )
+        springs = {"rotor_stiffness": 1.0, "rotor_cubic_stiffness": 0.04}
+        parameters = torsion.Parameters(rotor_damping=0.1, **springs, rotor_excitation=1.0)
         return Family(parameters=parameters, drive=Drive(speed=1.0)), [0.0, 0.0]
     parameters = torsion.Parameters(rotor_damping=0.75, rotor_weight=2.25)
     family = Family(

@@ -54,10 +54,8 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     from fmpy import platform, platform_tuple
 
     folder = tmp_path_factory.mktemp("probed")
-    return {
-        2: compiled(folder, "probed", "modelDescription.xml", platform),
-        3: compiled(folder, "probed3", "probed3.xml", platform_tuple),
-    }
+    given = {2: ("probed", "modelDescription.xml", platform), 3: ("probed3", "probed3.xml", platform_tuple)}
+    return {version: compiled(folder, *names) for version, names in given.items()}
 
 
 @pytest.fixture(scope="session")
@@ -157,9 +155,7 @@ def test_an_fmu_of_others_is_probed(tmp_path):
     assert {"'Müller'", "'(a)'", "'100%'", "file:/path"} <= crashed
     assert "'with space'" not in crashed
     assert not [finding for finding in report.findings if "/repeat/" in finding.replay]
-    assert "largest relative difference" in next(
-        outcome.said for outcome in report.outcomes if outcome.check == "split"
-    )
+    assert "largest relative difference" in next(o.said for o in report.outcomes if o.check == "split")
 
 
 @pytest.mark.slow
@@ -173,9 +169,8 @@ def test_a_reference_fmu_is_probed(tmp_path, name):
     with tarfile.open(archives[-1]) as archive:
         member = next(m for m in archive.getmembers() if m.name.endswith(f"tests/data/reference/{name}.fmu"))
         fmu.write_bytes(archive.extractfile(member).read())
-    report = probe.probe(
-        fmu, checks=["starts", "repeat", "restore", "derivatives", "leaks", "forbidden"], calls=2000, hang=2.0
-    )
+    checks = ["starts", "repeat", "restore", "derivatives", "leaks", "forbidden"]
+    report = probe.probe(fmu, checks=checks, calls=2000, hang=2.0)
     assert not [f for f in report.findings if "/forbidden/" not in f.replay]
     crashed = " ".join(finding.subject for finding in report.with_severity(probe.CRASH))
     assert "SerializeFMU" in crashed
@@ -312,9 +307,8 @@ def test_an_fmu_that_makes_no_instance_is_said(natives: dict[str, Path], tmp_pat
     report = probe.probe(tmp_path / "other.fmu", interface="cs", checks=["starts", "derivatives"])
     assert [outcome.check for outcome in report.outcomes] == ["starts", "derivatives"]
     assert all("not made: no instance is made" in outcome.said for outcome in report.outcomes)
-    assert (
-        probe.probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10).findings[0].severity == "wrong"
-    )
+    report = probe.probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10)
+    assert report.findings[0].severity == "wrong"
 
 
 @pytest.mark.parametrize(("state", "severity"), [("initialization", "questionable"), ("continuous", "wrong")])

@@ -283,9 +283,9 @@ FOUR_BAR = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35,
 
 
 class TestMovedPivot:
-    @pytest.mark.parametrize(
-        "unknown", [syn.SliderUnknown(harmonics=2), syn.CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)]
-    )
+    CRANK = syn.CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)
+
+    @pytest.mark.parametrize("unknown", [syn.SliderUnknown(harmonics=2), CRANK])
     def test_starts_and_linkages_are_each_others_inverse(self, unknown: Any) -> None:
         pivot: syn.SliderMotion | syn.SecondCrank
         if isinstance(unknown, syn.SliderUnknown):

@@ -9,32 +9,8 @@ from click.testing import Result
 from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
+from analysis import periodic
 from analysis.numerics.boundaries import scan
-from analysis.periodic import (
-    Branch,
-    Crossing,
-    Drive,
-    Family,
-    Risk,
-    SpecialPoint,
-    Stability,
-    boundary_gradient,
-    confirm_form,
-    describe_end,
-    find_orbit,
-    find_orbits,
-    follow,
-    follow_both,
-    follow_crossing,
-    frequency_response,
-    newton_orbit,
-    normal_form,
-    orbit_test,
-    plane,
-    special_gradient,
-    switch,
-    with_isolas,
-)
 from analysis.periodic.motion.drive import motion_scales
 from analysis.periodic.response.advice import arcs, fold_jumps
 from linkwork.errors import InputError, LinkworkError
@@ -47,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("registered")
 
 # Mathieu: y'' + (a - 2 q cos 2t) y = 0, a turn of the crank for half a period of the solutions, 2t its angle
 
-MATHIEU = Drive(speed=2.0)
+MATHIEU = periodic.Drive(speed=2.0)
 
 
 def mathieu(a: float, q: float) -> torsion.Parameters:
@@ -56,9 +32,12 @@ def mathieu(a: float, q: float) -> torsion.Parameters:
 
 @pytest.mark.parametrize("q", MATHIEU_A)
 def test_multipliers_pass_the_unit_circle_at_the_characteristic_values_of_mathieu(q: float) -> None:
-    operation, (low, high) = plane(mathieu(0.0, q), MATHIEU, "rotor.stiffness", "rotor.modulation"), (-2.0 * q, 30.0)
+    operation, (low, high) = (
+        periodic.plane(mathieu(0.0, q), MATHIEU, "rotor.stiffness", "rotor.modulation"),
+        (-2.0 * q, 30.0),
+    )
     for multiplier, orders in ((1, (0, 2, 4)), (-1, (1, 3, 5))):
-        test = orbit_test(operation, multiplier)
+        test = periodic.orbit_test(operation, multiplier)
         roots = scan(lambda a, test=test: test(a, -2.0 * q), low, high).roots  # type: ignore[misc]
         expected = [mathieu_a(r, q) for r in orders] + [mathieu_b(r, q) for r in orders if r]
         assert roots == pytest.approx(sorted(a for a in expected if low < a < high), abs=1e-9)
@@ -69,10 +48,12 @@ def test_multipliers_pass_the_unit_circle_at_the_characteristic_values_of_mathie
 
 
 def test_branches_and_boundaries_find_the_characteristic_values_of_mathieu() -> None:
-    family = Family(parameters=mathieu(0.0, 1.0), drive=MATHIEU, vary="rotor.stiffness")
-    branch = follow(family, newton_orbit(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
-    odd, even = ([s for s in branch.special if (s.kind is Crossing.PERIOD_DOUBLING) is own] for own in (True, False))
-    assert {special.kind for special in even} == {Crossing.BRANCH_POINT}
+    family = periodic.Family(parameters=mathieu(0.0, 1.0), drive=MATHIEU, vary="rotor.stiffness")
+    branch = periodic.follow(family, periodic.newton_orbit(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
+    odd, even = (
+        [s for s in branch.special if (s.kind is periodic.Crossing.PERIOD_DOUBLING) is own] for own in (True, False)
+    )
+    assert {special.kind for special in even} == {periodic.Crossing.BRANCH_POINT}
     expected = [mathieu_b(1, 1.0), mathieu_a(1, 1.0), mathieu_b(3, 1.0), mathieu_a(3, 1.0)]
     assert [special.parameter for special in odd] == pytest.approx(expected, abs=1e-9)
     # the second multiplier crosses with the first: its place is as uncertain as the root of rounding
@@ -80,12 +61,12 @@ def test_branches_and_boundaries_find_the_characteristic_values_of_mathieu() -> 
     assert [special.parameter for special in even] == pytest.approx(expected, abs=1e-6)
     # between b_r and a_r the equation has solutions that grow
     words = [branch.stability()[special.after + 1] for special in odd]
-    assert words == [Stability.UNSTABLE, Stability.MARGINAL] * 2
+    assert words == [periodic.Stability.UNSTABLE, periodic.Stability.MARGINAL] * 2
 
-    curve = follow_crossing(
-        plane(mathieu(0.0, 1.0), MATHIEU, "rotor.modulation", "rotor.stiffness"),
+    curve = periodic.follow_crossing(
+        periodic.plane(mathieu(0.0, 1.0), MATHIEU, "rotor.modulation", "rotor.stiffness"),
         odd[1].orbit,
-        Crossing.PERIOD_DOUBLING,
+        periodic.Crossing.PERIOD_DOUBLING,
         (-2.0, odd[1].parameter),
         x=(-6.0, -1.0),
         y=(-5.0, 5.0),
@@ -97,14 +78,16 @@ def test_branches_and_boundaries_find_the_characteristic_values_of_mathieu() -> 
 
 def test_a_branch_has_the_unstable_windows_that_lie_within_one_of_its_steps() -> None:
     q, low = 0.05, 0.3
-    family = Family(parameters=mathieu(0.0, q), drive=MATHIEU, vary="rotor.stiffness")
-    branch = follow(family, newton_orbit(mathieu(low, q), MATHIEU), low, low=low, high=8.0)
+    family = periodic.Family(parameters=mathieu(0.0, q), drive=MATHIEU, vary="rotor.stiffness")
+    branch = periodic.follow(family, periodic.newton_orbit(mathieu(low, q), MATHIEU), low, low=low, high=8.0)
     doublings, others = branch.special[:2], branch.special[2:]
-    assert [s.kind for s in branch.special] == [Crossing.PERIOD_DOUBLING] * 2 + [Crossing.BRANCH_POINT] * 2
+    assert [s.kind for s in branch.special] == [periodic.Crossing.PERIOD_DOUBLING] * 2 + [
+        periodic.Crossing.BRANCH_POINT
+    ] * 2
     assert [s.parameter for s in doublings] == pytest.approx([mathieu_b(1, q), mathieu_a(1, q)], abs=1e-9)
     assert [s.parameter for s in others] == pytest.approx([mathieu_b(2, q), mathieu_a(2, q)], abs=1e-7)
     # of each window the branch has the one point that was inserted
-    unstable = [n for n, word in enumerate(branch.stability()) if word is Stability.UNSTABLE]
+    unstable = [n for n, word in enumerate(branch.stability()) if word is periodic.Stability.UNSTABLE]
     assert unstable == [special.after for special in branch.special[1::2]]
     assert (np.diff(branch.parameter) > 0.0).all()
 
@@ -115,12 +98,12 @@ DUFFING = torsion.Parameters(rotor_damping=0.1, rotor_stiffness=1.0, rotor_cubic
 
 
 @pytest.fixture(scope="module")
-def hardening() -> Branch:
-    orbit = find_orbit(DUFFING, speed=0.5)
-    return follow(Family(parameters=DUFFING, drive=orbit.drive), orbit, 0.5, low=0.5, high=3.0)
+def hardening() -> periodic.Branch:
+    orbit = periodic.find_orbit(DUFFING, speed=0.5)
+    return periodic.follow(periodic.Family(parameters=DUFFING, drive=orbit.drive), orbit, 0.5, low=0.5, high=3.0)
 
 
-def collocated(family: Family, special: SpecialPoint, samples: int) -> oscillator.Found:
+def collocated(family: periodic.Family, special: periodic.SpecialPoint, samples: int) -> oscillator.Found:
     """The special point by Fourier collocation, begun at ours."""
 
     def law(value: float) -> tuple[float, torsion.Constants]:
@@ -129,18 +112,16 @@ def collocated(family: Family, special: SpecialPoint, samples: int) -> oscillato
         return drive.speed, parameters.constants()
 
     orbit = special.orbit
-    return oscillator.special_point(
-        law,
+    angle, doubling = (
         orbit.turn(samples * orbit.turns)["rotor.angle"],
-        special.parameter,
-        orbit.turns,
-        antiperiodic=special.kind is Crossing.PERIOD_DOUBLING,
+        special.kind is periodic.Crossing.PERIOD_DOUBLING,
     )
+    return oscillator.special_point(law, angle, special.parameter, orbit.turns, antiperiodic=doubling)
 
 
-def test_folds_of_duffing_are_those_of_fourier_collocation(hardening: Branch) -> None:
+def test_folds_of_duffing_are_those_of_fourier_collocation(hardening: periodic.Branch) -> None:
     assert hardening.reached
-    assert [special.kind for special in hardening.special] == [Crossing.FOLD, Crossing.FOLD]
+    assert [special.kind for special in hardening.special] == [periodic.Crossing.FOLD, periodic.Crossing.FOLD]
     for special in hardening.special:
         found = collocated(hardening.family, special, 128)
         assert found.residual < 1e-9
@@ -155,16 +136,16 @@ def test_folds_of_duffing_are_those_of_fourier_collocation(hardening: Branch) ->
     assert found == pytest.approx([speeds[least:].max(), speeds[least]], rel=5e-3)
 
 
-def test_between_the_folds_of_duffing_there_are_three_motions(hardening: Branch) -> None:
+def test_between_the_folds_of_duffing_there_are_three_motions(hardening: periodic.Branch) -> None:
     upper, lower = (special.parameter for special in hardening.special)
     for speed, count in ((lower - 0.01, 1), (0.5 * (lower + upper), 3), (upper + 0.01, 1)):
-        found = find_orbits(DUFFING, speed=speed)
+        found = periodic.find_orbits(DUFFING, speed=speed)
         assert (len(found), found.agreed, found.index) == (count, True, 1)
 
 
-def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: Branch) -> None:
-    middle = find_orbits(DUFFING, speed=1.4).orbits[1]
-    both = follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0)
+def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: periodic.Branch) -> None:
+    middle = periodic.find_orbits(DUFFING, speed=1.4).orbits[1]
+    both = periodic.follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0)
     assert both.reached
     assert sorted([both.parameter[0], both.parameter[-1]]) == [0.5, 3.0]
     found = {special.parameter for special in both.special}
@@ -174,13 +155,13 @@ def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: Branch) -
         before, after = both.largest_multiplier[special.after : special.after + 2]
         assert min(before, after) < 1.0 < max(before, after)
     # each end that was not reached is named
-    short = follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0, most_points=7)
+    short = periodic.follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0, most_points=7)
     low, high = (hardening.family.format_value(short.parameter[end]) for end in (0, -1))
-    assert describe_end(short).startswith(f"the branch is followed from {low} to {high} only: at {low} ")
-    assert f", at {high} " in describe_end(short)
+    assert periodic.describe_end(short).startswith(f"the branch is followed from {low} to {high} only: at {low} ")
+    assert f", at {high} " in periodic.describe_end(short)
 
 
-def test_the_arcs_of_duffing_end_at_its_folds(hardening: Branch) -> None:
+def test_the_arcs_of_duffing_end_at_its_folds(hardening: periodic.Branch) -> None:
     found = arcs([hardening])
     assert [arc.stable for arc in found] == [True, False, True]
     ends = [[float(arc.parameter[0]), float(arc.parameter[-1])] for arc in found]
@@ -192,16 +173,16 @@ def test_the_arcs_of_duffing_end_at_its_folds(hardening: Branch) -> None:
     assert sorted(jump.parameter for jump in fold_jumps([hardening])) == pytest.approx(folds, rel=1e-10)
 
 
-def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hardening: Branch) -> None:
+def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hardening: periodic.Branch) -> None:
     words = ["both motions at lower values", "both motions at higher values"]
     for special, expected in zip(hardening.special, words):
-        form = normal_form(hardening.family, special)
+        form = periodic.normal_form(hardening.family, special)
         exact = oscillator.curvature_at_fold(*of_a_map(special))
         assert form.words == expected
         assert abs(form.coefficient) == pytest.approx(abs(exact), rel=1e-6)
 
 
-def of_a_map(special: SpecialPoint) -> tuple[torsion.Constants, float, np.ndarray, int, np.ndarray]:
+def of_a_map(special: periodic.SpecialPoint) -> tuple[torsion.Constants, float, np.ndarray, int, np.ndarray]:
     orbit = special.orbit
     assert orbit.drive.speed is not None
     scale = motion_scales(orbit.parameters, orbit.drive, orbit.start)
@@ -213,44 +194,46 @@ def of_a_map(special: SpecialPoint) -> tuple[torsion.Constants, float, np.ndarra
 DRIVEN, NATURAL = 2.0 * pi, 3.0 * pi
 
 
-def pendulum(strength: float) -> tuple[torsion.Parameters, Drive]:
+def pendulum(strength: float) -> tuple[torsion.Parameters, periodic.Drive]:
     weight = NATURAL**2
     parameters = torsion.Parameters(
         rotor_damping=0.5 * NATURAL, rotor_weight=weight, rotor_excitation=strength * weight
     )
-    return parameters, Drive(speed=DRIVEN)
+    return parameters, periodic.Drive(speed=DRIVEN)
 
 
 @pytest.fixture(scope="module")
-def cascade() -> list[Branch]:
+def cascade() -> list[periodic.Branch]:
     """Motions of 1, 2, 4 and 8 turns, each switched to from the one before."""
     parameters, drive = pendulum(1.06)
-    family = Family(parameters=parameters, drive=drive, vary=pendulum, name="strength")
-    found = find_orbits(parameters, speed=DRIVEN)
+    family = periodic.Family(parameters=parameters, drive=drive, vary=pendulum, name="strength")
+    found = periodic.find_orbits(parameters, speed=DRIVEN)
     # there is one in every well, and its mirror image
     orbit = min(found.stable, key=lambda orbit: abs(orbit.start[0] + 0.5 * pi))
-    branches = [follow(family, orbit, 1.06, low=1.06, high=1.083)]
+    branches = [periodic.follow(family, orbit, 1.06, low=1.06, high=1.083)]
     for _ in range(3):
-        branches.append(switch(family, branches[-1].special[0], low=1.06, high=1.083, greatest=5e-3))
+        branches.append(periodic.switch(family, branches[-1].special[0], low=1.06, high=1.083, greatest=5e-3))
     return branches
 
 
 def test_the_pendulum_breaks_its_symmetry_at_a_branch_point() -> None:
     weight, (parameters, drive) = NATURAL**2, pendulum(1.0)
     ends = weight, 1.01 * weight
-    response = frequency_response(parameters, *ends, drive=drive, vary="rotor.excitation", doublings=0)
+    response = periodic.frequency_response(parameters, *ends, drive=drive, vary="rotor.excitation", doublings=0)
     (own,) = (special for branch in response.branches for special in branch.special)
-    assert own.kind is Crossing.BRANCH_POINT
-    form = normal_form(response.family, own)
+    assert own.kind is periodic.Crossing.BRANCH_POINT
+    form = periodic.normal_form(response.family, own)
     assert form.words == "supercritical"
-    assert confirm_form(response.family, own, form).agrees(form)
+    assert periodic.confirm_form(response.family, own, form).agrees(form)
     names = "rotor.excitation", "rotor.damping"
     with pytest.raises(LinkworkError, match="branches cross"):
-        special_gradient(response.family, own)
+        periodic.special_gradient(response.family, own)
     with pytest.raises(LinkworkError, match="branches cross"):
-        boundary_gradient(own.orbit, own.kind, names)
+        periodic.boundary_gradient(own.orbit, own.kind, names)
     with pytest.raises(InputError, match="singular"):
-        follow_crossing(plane(parameters, drive, *names), own.orbit, own.kind, (ends[0], 0.1), x=ends, y=(0.0, 1.0))
+        periodic.follow_crossing(
+            periodic.plane(parameters, drive, *names), own.orbit, own.kind, (ends[0], 0.1), x=ends, y=(0.0, 1.0)
+        )
     # half a period of a symmetric motion ends in its mirror image; it breaks where a deviation ends in itself
     p = own.orbit.parameters.constants()
 
@@ -267,16 +250,16 @@ def test_the_pendulum_breaks_its_symmetry_at_a_branch_point() -> None:
     # the machine passes it without a jump, and two mirror images are stable beyond
     assert response.jumps == ()
     (avoided,) = response.speeds_to_avoid
-    assert (avoided.risk, avoided.low, avoided.high) == (Risk.SEVERAL, own.parameter, ends[1])
-    stable = [branch for branch in response.branches if set(branch.stability()) == {Stability.STABLE}]
+    assert (avoided.risk, avoided.low, avoided.high) == (periodic.Risk.SEVERAL, own.parameter, ends[1])
+    stable = [branch for branch in response.branches if set(branch.stability()) == {periodic.Stability.STABLE}]
     assert [branch.parameter[-1] for branch in stable] == 2 * [ends[1]]
 
 
 @pytest.mark.slow
-def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[Branch]) -> None:
+def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[periodic.Branch]) -> None:
     assert [branch.turns for branch in cascade] == [1, 2, 4, 8]
     doublings = [branch.special[0] for branch in cascade]
-    assert {special.kind for special in doublings} == {Crossing.PERIOD_DOUBLING}
+    assert {special.kind for special in doublings} == {periodic.Crossing.PERIOD_DOUBLING}
     values = np.array([special.parameter for special in doublings])
     # to one in the last digit printed: the first is 1.06637
     assert values == pytest.approx(PENDULUM_DOUBLINGS, abs=1e-4)
@@ -288,9 +271,9 @@ def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[Branch
     assert steps[:-1] / steps[1:] == pytest.approx(FEIGENBAUM, rel=2e-3)
 
 
-def test_the_pendulum_doubles_gently_by_the_series_of_the_map(cascade: list[Branch]) -> None:
+def test_the_pendulum_doubles_gently_by_the_series_of_the_map(cascade: list[periodic.Branch]) -> None:
     for branch in cascade:
-        form = normal_form(branch.family, branch.special[0])
+        form = periodic.normal_form(branch.family, branch.special[0])
         exact = oscillator.cubic_coefficient(*of_a_map(branch.special[0]))
         assert form.words == "supercritical"
         # the map of eight turns has the largest third derivatives, and the most uncertain differences of them
@@ -298,20 +281,23 @@ def test_the_pendulum_doubles_gently_by_the_series_of_the_map(cascade: list[Bran
         assert abs(form.coefficient - exact) < 2.0 * form.uncertainty + 1e-6 * exact
 
 
-def test_each_doubled_motion_of_the_pendulum_is_stable_until_it_doubles(cascade: list[Branch]) -> None:
+def test_each_doubled_motion_of_the_pendulum_is_stable_until_it_doubles(cascade: list[periodic.Branch]) -> None:
     for branch in cascade:
         after = branch.special[0].after
-        assert set(branch.stability()[1 : after + 1]) == {Stability.STABLE}
-        assert set(branch.stability()[after + 1 :]) == {Stability.UNSTABLE}
+        assert set(branch.stability()[1 : after + 1]) == {periodic.Stability.STABLE}
+        assert set(branch.stability()[after + 1 :]) == {periodic.Stability.UNSTABLE}
 
 
 def test_frequency_response_doubles_again_as_often_as_asked() -> None:
     parameters, drive = pendulum(1.06)
     # the strength of the excitation by its FMI name
     low, high = 1.06 * NATURAL**2, 1.083 * NATURAL**2
-    start = min(find_orbits(parameters, speed=DRIVEN).stable, key=lambda orbit: abs(orbit.start[0] + 0.5 * pi)).start
-    response = frequency_response(
-        parameters, low, high, drive=drive, vary="rotor.excitation", start=start, doublings=3, greatest_step=2e-2
+    start = min(
+        periodic.find_orbits(parameters, speed=DRIVEN).stable, key=lambda orbit: abs(orbit.start[0] + 0.5 * pi)
+    ).start
+    fine = {"doublings": 3, "greatest_step": 2e-2}
+    response = periodic.frequency_response(
+        parameters, low, high, drive=drive, vary="rotor.excitation", start=start, **fine
     )
     own = [branch for branch in response.branches if branch.orbits[0].start[0] < 0.0][:1]
     own += [branch for branch in response.branches if branch.turns > 1]
@@ -325,27 +311,27 @@ def test_frequency_response_doubles_again_as_often_as_asked() -> None:
 # torque a motion and its mirror image leave the rest between two pitchforks and meet again; with it one of them is closed
 
 TONGUE = torsion.Parameters(
-    rotor_stiffness=1.0, rotor_damping=0.05, rotor_cubic_stiffness=0.2, rotor_modulation=0.8, rotor_excitation=0.02
-)
+    rotor_stiffness=1.0, rotor_damping=0.05, rotor_cubic_stiffness=0.2, rotor_modulation=0.8, rotor_excitation=0.02,
+)  # fmt: skip
 
 
 def test_the_motions_of_an_isola_are_found_and_followed_until_they_close() -> None:
-    response = frequency_response(TONGUE, 0.8, 1.5, greatest_step=2e-2)
+    response = periodic.frequency_response(TONGUE, 0.8, 1.5, greatest_step=2e-2)
     assert not any(branch.closed for branch in response.branches)
-    whole = with_isolas(response, places=1, greatest_step=2e-2)
+    whole = periodic.with_isolas(response, places=1, greatest_step=2e-2)
     assert whole.branches[:-1] == response.branches
     isola = whole.branches[-1]
     assert isola.closed
-    assert [special.kind for special in isola.special] == [Crossing.FOLD, Crossing.FOLD]
+    assert [special.kind for special in isola.special] == [periodic.Crossing.FOLD, periodic.Crossing.FOLD]
     for special in isola.special:
         found = collocated(isola.family, special, 128)
         assert special.parameter == pytest.approx(found.parameter, rel=1e-9)
     ends = sorted(special.parameter for special in isola.special)
     assert [isola.parameter.min(), isola.parameter.max()] == pytest.approx(ends, rel=1e-3)
     # nothing is left to be found, and what was there is not found twice
-    assert len(with_isolas(whole, places=2, greatest_step=2e-2).branches) == len(whole.branches)
+    assert len(periodic.with_isolas(whole, places=2, greatest_step=2e-2).branches) == len(whole.branches)
     with pytest.raises(InputError, match="places is 0"):
-        with_isolas(response, places=0)
+        periodic.with_isolas(response, places=0)
 
 
 @pytest.mark.slow

@@ -14,16 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 import analysis.synthesis as syn
-from analysis.studies.youssef.problems import (
-    PACKAGING_FLATNESS,
-    PACKAGING_OFFSET_CM,
-    PACKAGING_POINTS_CM,
-    PACKAGING_ROTATION,
-    PACKAGING_TRAVEL,
-    PROBLEMS,
-    packaging_path,
-    rocker_function,
-)
+from analysis.studies.youssef import problems
 from tests import published
 
 FloatArray = NDArray[np.float64]
@@ -78,7 +69,7 @@ def error_of(name: str, row: tuple[float, ...], side: int = 1, offset_deg: float
     if name in PATHS:
         target = 20.0 + PATHS[name] * np.cos(phi) + 1j * (15.0 + 5.0 * np.sin(phi))
     else:
-        target = np.array(PACKAGING_POINTS_CM) @ [1.0, 1j] + complex(*PACKAGING_OFFSET_CM)
+        target = np.array(problems.PACKAGING_POINTS_CM) @ [1.0, 1j] + complex(*problems.PACKAGING_OFFSET_CM)
     curve = pins(row, phi, side)[0]
     polygons = [shapely.make_valid(shapely.Polygon(np.column_stack([z.real, z.imag]))) for z in (curve, target)]
     return float(shapely.symmetric_difference(*polygons).area)
@@ -86,7 +77,7 @@ def error_of(name: str, row: tuple[float, ...], side: int = 1, offset_deg: float
 
 @cache
 def solved(name: str) -> syn.Synthesis:
-    p = PROBLEMS[name]
+    p = problems.PROBLEMS[name]
     return syn.synthesize(p.task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES))
 
 
@@ -95,7 +86,7 @@ def solved(name: str) -> syn.Synthesis:
 
 @pytest.mark.parametrize("name", published.CHAPTER_6)
 def test_printed_data(name: str) -> None:
-    p = PROBLEMS[name]
+    p = problems.PROBLEMS[name]
     assert row_of(p.printed) == pytest.approx(published.CHAPTER_6[name], rel=1e-14, abs=1e-14)
     assert row_of(p.linkage) == pytest.approx(read(name), rel=1e-14, abs=1e-14)
     assert p.linkage.branch == (-1 if name == "packaging" else 1)
@@ -106,7 +97,7 @@ def test_printed_data(name: str) -> None:
 
 @pytest.mark.parametrize("name", published.CHAPTER_6_ERRORS)
 def test_printed_linkages_evaluate_to(name: str) -> None:
-    p, known = PROBLEMS[name], published.CHAPTER_6_ERRORS[name]
+    p, known = problems.PROBLEMS[name], published.CHAPTER_6_ERRORS[name]
     error = p.convert(syn.evaluate(p.task, p.linkage).error)
     assert error == pytest.approx(known.true, abs=known.digits)
     assert error == pytest.approx(error_of(name, read(name)), rel=1e-9)
@@ -115,30 +106,29 @@ def test_printed_linkages_evaluate_to(name: str) -> None:
 @pytest.mark.parametrize("name", published.CHAPTER_6_READ)
 def test_what_the_misprints_would_give(name: str) -> None:
     """As printed the curve is far off, and the error a multiple of the stated one."""
-    p = PROBLEMS[name]
+    p = problems.PROBLEMS[name]
     assert p.error is not None
     assert p.convert(syn.evaluate(p.task, p.printed).error) > 3.0 * p.error
 
 
 def test_the_rocker_functions_number_of_crank_angles_matters() -> None:
-    p = PROBLEMS["rocker"]
+    p = problems.PROBLEMS["rocker"]
     true, least = published.ROCKER_AT_48
-    assert p.convert(syn.evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
-    found = syn.synthesize(
-        rocker_function(48), p.bounds, p.constraints, search=syn.Search(starts=4, candidates=1 << 13)
-    ).best
+    assert p.convert(syn.evaluate(problems.rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
+    search = syn.Search(starts=4, candidates=1 << 13)
+    found = syn.synthesize(problems.rocker_function(48), p.bounds, p.constraints, search=search).best
     assert p.convert(found.error) == pytest.approx(least, abs=0.05)
 
 
 def test_the_window_includes_its_ends() -> None:
     """At N = 24, 35.8 with 60 degrees in the window and 35.65 without; 104.9 at N = 72 with both ends."""
-    p = PROBLEMS["rocker-weighted"]
-    task = rocker_function(24, weighted=True)
+    p = problems.PROBLEMS["rocker-weighted"]
+    task = problems.rocker_function(24, weighted=True)
     weights = np.array(task.weights)
     assert np.flatnonzero(weights > 1.0).tolist() == list(range(4, 18))
     weights[4] = 1.0
     assert p.convert(syn.evaluate(replace(task, weights=weights), p.linkage).error) == pytest.approx(35.65, abs=5e-3)
-    many = rocker_function(72, weighted=True)
+    many = problems.rocker_function(72, weighted=True)
     assert window_sum(many, p.linkage) == pytest.approx(published.WINDOW_SUM, abs=0.05)
     # 260 is a station of these
     short = replace(many, weights=np.where(np.arange(72) == 52, 1.0, np.asarray(many.weights)))
@@ -151,28 +141,28 @@ def window_sum(task: syn.RockerFunction, linkage: syn.Linkage) -> float:
 
 
 def test_the_printed_packaging_machine() -> None:
-    p = PROBLEMS["packaging"]
+    p = problems.PROBLEMS["packaging"]
     travel, flatness, area, transmission = published.PACKAGING
     curve = p.linkage.path(syn.turn(72))
     parts = [np.take(curve, np.arange(start, start + 25), axis=0, mode="wrap") for start in range(72)]
     extents = [(np.ptp(part[:, 1]), abs(part[-1, 0] - part[0, 0])) for part in parts]
-    least, long = min(extent for extent in extents if extent[1] >= PACKAGING_TRAVEL)
+    least, long = min(extent for extent in extents if extent[1] >= problems.PACKAGING_TRAVEL)
     assert 100.0 * long == pytest.approx(travel, abs=0.05)
     assert 100.0 * least == pytest.approx(flatness, abs=5e-3)
-    assert 1e4 * syn.area_difference(curve, packaging_path()) == pytest.approx(area, abs=0.5)
+    assert 1e4 * syn.area_difference(curve, problems.packaging_path()) == pytest.approx(area, abs=0.5)
     # the points that the task has in place of two of the ten leave the polygon what it is
     assert isinstance(p.task, syn.UntimedPath)
-    assert syn.area_difference(packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
+    assert syn.area_difference(problems.packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
     assert degrees(p.linkage.least_transmission) == pytest.approx(transmission, abs=0.05)
-    assert p.linkage.pivot_y < PACKAGING_OFFSET_CM[1] / 100.0
+    assert p.linkage.pivot_y < problems.PACKAGING_OFFSET_CM[1] / 100.0
 
 
 # The problems solved
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", problems.PROBLEMS)
 def test_goals(name: str) -> None:
-    p, result = PROBLEMS[name], solved(name)
+    p, result = problems.PROBLEMS[name], solved(name)
     best = result.best
     error = p.convert(best.error)
     assert error <= p.goal
@@ -192,11 +182,11 @@ def test_goals(name: str) -> None:
 def test_the_caps_are_the_printed_longest_links() -> None:
     caps = {
         name: [100.0 * c.length for c in p.constraints if isinstance(c, syn.LargestLink)]
-        for name, p in PROBLEMS.items()
+        for name, p in problems.PROBLEMS.items()
     }
     expected = {"ellipse-a": 112.85, "ellipse-b": 216.94, "path-a": 139.25, "path-b": 184.443, "packaging": 435.15}
     assert {name: cap[0] for name, cap in caps.items() if cap} == pytest.approx(expected)
-    for name, p in PROBLEMS.items():
+    for name, p in problems.PROBLEMS.items():
         asked = syn.FullTurn if name in ROCKERS else syn.LeastTransmission
         assert [c for c in p.constraints if isinstance(c, asked)]
 
@@ -207,32 +197,31 @@ def test_packaging_machine_pushes_straight() -> None:
     assert straight is not None
     assert best.evaluation.rotation is not None
     first, last = best.evaluation.rotation[[straight.start, straight.end]]
-    assert abs(last - first) <= PACKAGING_ROTATION + 1e-8
+    assert abs(last - first) <= problems.PACKAGING_ROTATION + 1e-8
     point = pins(row_of(best.linkage), np.linspace(first, last, 500), best.linkage.branch)[0]
-    assert abs(point[-1].real - point[0].real) >= 100.0 * PACKAGING_TRAVEL
-    assert np.ptp(point.imag) < 100.0 * PACKAGING_FLATNESS
-    assert np.abs(point.imag - PACKAGING_OFFSET_CM[1]).max() < 2.5
-    assert best.linkage.pivot_y < PACKAGING_OFFSET_CM[1] / 100.0
+    assert abs(point[-1].real - point[0].real) >= 100.0 * problems.PACKAGING_TRAVEL
+    assert np.ptp(point.imag) < 100.0 * problems.PACKAGING_FLATNESS
+    assert np.abs(point.imag - problems.PACKAGING_OFFSET_CM[1]).max() < 2.5
+    assert best.linkage.pivot_y < problems.PACKAGING_OFFSET_CM[1] / 100.0
 
 
 def test_a_free_mounting_angle() -> None:
-    p = PROBLEMS["rocker-weighted"]
-    task = rocker_function(72, weighted=True, mounting=True)
+    p = problems.PROBLEMS["rocker-weighted"]
+    task = problems.rocker_function(72, weighted=True, mounting=True)
     best = syn.synthesize(task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES)).best
     assert window_sum(task, best.linkage) == pytest.approx(published.WINDOW_SUM_MOUNTED, abs=0.05)
     # another output angle is worse: the one found is the best for these links
     for step in (-1e-3, 1e-3):
         other = replace(best.linkage, output_angle=best.linkage.output_angle + step)
         assert syn.evaluate(task, other).error > best.error
-    twice = syn.synthesize(
-        p.task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES)
-    ).best
+    search = syn.Search(starts=STARTS, candidates=CANDIDATES)
+    twice = syn.synthesize(p.task, p.bounds, p.constraints, search=search).best
     assert twice.linkage.output_angle == 0.0
 
 
 @pytest.mark.parametrize("name", ROCKERS)
 def test_error_against_transmission_angle(name: str) -> None:
-    p = PROBLEMS[name]
+    p = problems.PROBLEMS[name]
     angles = np.radians([0.0, 30.0, 40.0, 50.0])
     found = syn.trade_off(p.task, "transmission", angles, constraints=p.constraints, search=syn.Search(starts=3))
     errors = p.convert(1.0) * np.asarray(found.error.filled(np.nan))
@@ -248,12 +237,12 @@ def test_error_against_transmission_angle(name: str) -> None:
 
 
 def test_what_the_thesis_bounds() -> None:
-    bounds = PROBLEMS["ellipse-a-bounded"].bounds
+    bounds = problems.PROBLEMS["ellipse-a-bounded"].bounds
     for name in ("ground_length", "coupler_length", "rocker_length"):
         assert bounds[name] == pytest.approx((0.1, 0.3))
     assert bounds["crank_length"][1] == pytest.approx(0.1)
     assert bounds["point_distance"][1] == pytest.approx(0.3)
-    task = PROBLEMS["packaging"].task
+    task = problems.PROBLEMS["packaging"].task
     assert isinstance(task, syn.UntimedPath)
     assert task.straight is not None
     assert degrees(task.straight.rotation) == pytest.approx(120.0)

@@ -53,9 +53,8 @@ def test_the_thesiss_equations_of_a_step_are_those_of_its_matrices() -> None:
     found, found_right = equations(product, screws, INCH, "printed")
     np.testing.assert_allclose(found[0], matrix, atol=1e-12)
     np.testing.assert_allclose(found_right[0], right, atol=1e-12)
-    np.testing.assert_allclose(
-        equations(product, screws, INCH, "upper")[1][0], [*b.T[upper], *b_dual.T[upper]], atol=1e-12
-    )
+    found = equations(product, screws, INCH, "upper")[1][0]
+    np.testing.assert_allclose(found, [*b.T[upper], *b_dual.T[upper]], atol=1e-12)
 
 
 def test_where_the_thesiss_steps_become_small_its_equations_are_not_met() -> None:

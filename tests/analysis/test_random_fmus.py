@@ -78,16 +78,10 @@ def test_the_native_fmu_is_the_plant_within_its_tolerance(seed, tmp_path):
     known, step = mechanism.published[mechanism.name], 1e-3
     modes = {mode.arguments[0]: 0.0 for mode in mechanism.modes}
     file = build_native(mechanism, NATIVE_FMI3, tmp_path)
-    run = cosimulate(
-        file, known.parameters, Inputs(**modes), initial=known.initial, stop_time=0.02, step=step, tolerance=1e-12
-    )
-    plant = Plant(
-        mechanism,
-        known.parameters,
-        known.initial,
-        tolerance=1e-12,
-        **{m.name.replace(".", "_"): 0 for m in mechanism.modes},
-    )
+    times = {"stop_time": 0.02, "step": step}
+    run = cosimulate(file, known.parameters, Inputs(**modes), initial=known.initial, **times, tolerance=1e-12)
+    modes = {m.name.replace(".", "_"): 0 for m in mechanism.modes}
+    plant = Plant(mechanism, known.parameters, known.initial, tolerance=1e-12, **modes)
     assert len(run) == 21
     for n in range(len(run)):
         if n:

@@ -18,7 +18,7 @@ CHANGED = {"Writing", "Run"}
 BY_PLACE = {
     *("Quantity", "Whole", "Choice", "Many", "Range", "Table", "Kinds", "Piecewise", "Harmonics", "Function"),
     *("Encoded", "Occurrence", "Start"),
-}
+}  # fmt: skip
 
 
 def modules(package: ModuleType) -> Iterator[ModuleType]:

@@ -164,9 +164,8 @@ class TestUntimed:
         assert found.quality[0] < 1e-3 * normal.n
         for name in ("pivot_x", "pivot_y", "ground_length", "point_distance", "point_angle", "ground_angle"):
             # angles to half a step of these
-            assert getattr(linkage, name) == pytest.approx(
-                getattr(KNOWN, name), abs=0.06 if "angle" in name else 0.012
-            ), name
+            wide = 0.06 if "angle" in name else 0.012
+            assert getattr(linkage, name) == pytest.approx(getattr(KNOWN, name), abs=wide), name
         assert apart < 0.03 * normal.unit
 
     @pytest.mark.parametrize("way", [1, -1])
@@ -217,18 +216,9 @@ class TestShapes:
 
     def test_where_none_is_left_it_says_so(self) -> None:
         task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
-        normal, limits = stated(
-            task,
-            syn.FullTurn(),
-            ground_length=(1.0, 1.1),
-            crank_length=(0.3, 0.4),
-            coupler_length=(1.2, 1.3),
-            rocker_length=(0.05, 0.1),
-        )
-        with pytest.raises(
-            syn.InfeasibleError,
-            match=r"no shape of four-bar is within the bounds of the links and has a crank that turns fully",
-        ):
+        links = {"crank_length": (0.3, 0.4), "coupler_length": (1.2, 1.3), "rocker_length": (0.05, 0.1)}
+        normal, limits = stated(task, syn.FullTurn(), ground_length=(1.0, 1.1), **links)
+        with pytest.raises(syn.InfeasibleError, match=r"no shape of four-bar is within the bounds .* turns fully"):
             scan(normal, limits, seed=0, candidates=256, starts=4)
 
 

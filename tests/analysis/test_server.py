@@ -21,6 +21,7 @@ from contextlib import ExitStack, closing
 from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -105,8 +106,7 @@ def test_the_page_is_served_with_its_token_and_loads_nothing_from_elsewhere(serv
     assert "default-src 'none'" in policy
     # printf 'let a = 1;' | openssl dgst -sha256 -binary | base64
     assert "'sha256-xY6QKfH9PRsQnLz56nj6MBwiK5oHg+im1Jkpdp1x/Ck='" in policy
-    assert headers["X-Content-Type-Options"] == "nosniff"
-    assert headers["Referrer-Policy"] == "no-referrer"
+    assert (headers["X-Content-Type-Options"], headers["Referrer-Policy"]) == ("nosniff", "no-referrer")
     assert "Access-Control-Allow-Origin" not in headers
     assert "Server" not in headers
 
@@ -157,9 +157,8 @@ def test_what_is_not_the_page_is_refused(
         known = {"port": str(server.port), "token": server.application.token}
         return None if text is None else re.sub(r"\{(\w+)\}", lambda match: known[match[1]], text)
 
-    found, sent, text = _ask(
-        server, method, filled(path) or "", {name: filled(value) for name, value in headers.items()}, body
-    )
+    given = {name: filled(value) for name, value in headers.items()}
+    found, sent, text = _ask(server, method, filled(path) or "", given, body)
     assert found == status
     assert said in text.decode()
     assert not [name for name in sent if name.startswith("Access-Control")]
@@ -168,6 +167,7 @@ def test_what_is_not_the_page_is_refused(
 
 
 HEAD = "Host: 127.0.0.1:{port}\r\nX-Linkwork-Token: {token}\r\nConnection: close\r\n"
+CHUNKED = "Transfer-Encoding: chunked\r\n\r\n"
 
 
 @pytest.mark.parametrize(
@@ -179,17 +179,11 @@ HEAD = "Host: 127.0.0.1:{port}\r\nX-Linkwork-Token: {token}\r\nConnection: close
         pytest.param(f"GET /\xff\xfe HTTP/1.1\r\n{HEAD}\r\n", 400, id="no place"),
         pytest.param(f"GET /job HTTP/1.1\r\n{HEAD}Host: evil.example\r\n\r\n", 421, id="two hosts"),
         pytest.param(f"GET /job HTTP/1.1\r\n{HEAD}X-Linkwork-Token: guessed\r\n\r\n", 401, id="two tokens"),
-        pytest.param(
-            "GET /job HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nX_Linkwork_Token: {token}\r\n\r\n", 401, id="underscores"
-        ),
+        pytest.param(f"GET /job HTTP/1.1\r\n{HEAD.replace('X-Linkwork-', 'X_Linkwork_')}\r\n", 401, id="underscores"),
         pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: -5\r\n\r\n", 400, id="negative length"),
         pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: 99999999999\r\n\r\n", 413, id="length of a liar"),
         pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Transfer-Encoding: chunked\r\n\r\nzz\r\n", 400, id="no chunk"),
-        pytest.param(
-            f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: 9\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
-            415,
-            id="two lengths",
-        ),
+        pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: 9\r\n{CHUNKED}0\r\n\r\n", 415, id="two lengths"),
     ],
 )
 def test_what_is_no_request_is_refused(server: Server, text: str, status: int) -> None:
@@ -271,23 +265,17 @@ def test_a_process_that_cannot_be_started_fails_the_job_alone(monkeypatch: pytes
 
 def test_what_a_job_writes_of_its_compilation_is_its_progress(capfd: pytest.CaptureFixture[str]) -> None:
     sent: list[Any] = []
-
-    class Pipe:
-        def send(self, news: Any) -> None:
-            sent.append(news)
+    lines = ["linkwork: compiling the curves, once on this machine ...", "something else"]
 
     def job(kind: str, request: Any) -> dict[str, Any]:
-        sys.stderr.write("linkwork: compiling the curves, once on this machine ...\n")
-        sys.stderr.write("something else\n")
+        for line in lines:
+            sys.stderr.write(f"{line}\n")
         return {"words": kind}
 
-    answer = _answer(job, "path", {}, _Teller(Pipe(), 7))
+    answer = _answer(job, "path", {}, _Teller(SimpleNamespace(send=sent.append), 7))
     assert answer == {"state": "done", "answer": '{"words": "path"}'}
     assert sent == [(7, {"what": "compiling the curves, once on this machine", "share": 0.0})]
-    assert capfd.readouterr().err.splitlines() == [
-        "linkwork: compiling the curves, once on this machine ...",
-        "something else",
-    ]
+    assert capfd.readouterr().err.splitlines() == lines
 
 
 @pytest.mark.slow
@@ -526,9 +514,7 @@ def page(browser: Browser, studio: Server) -> Iterator[Page]:
     wrong: list[str] = []
     made.on("pageerror", lambda error: wrong.append(str(error)))
     # a job that is refused because of another one is an error to the browser alone
-    made.on(
-        "console", lambda said: wrong.append(said.text) if said.type == "error" and "409" not in said.text else None
-    )
+    made.on("console", lambda said: wrong.extend([said.text] * (said.type == "error" and "409" not in said.text)))
     made.goto(studio.address)
     _wait(made, "document.documentElement.dataset.ready")
     made.click("#play")

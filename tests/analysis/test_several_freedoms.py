@@ -7,20 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, figures, find_orbit
+from analysis import Inputs, figures, find_orbit, periodic
 from analysis.linkages import linkage
-from analysis.periodic import (
-    Branch,
-    Crossing,
-    Drive,
-    Response,
-    Risk,
-    Stability,
-    frequency_response,
-    normal_form,
-    special_gradient,
-    steady_drive,
-)
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.drive import start_ranges
 from analysis.periodic.motion.flow import VARIATIONAL
@@ -75,11 +63,11 @@ def shaker(tmp_path: Path) -> Case:
 
 
 @pytest.fixture
-def response(shaker: Case) -> Response:
-    return frequency_response(shaker.parameters, LOW, HIGH, drive=Drive(speed=LOW))
+def response(shaker: Case) -> periodic.Response:
+    return periodic.frequency_response(shaker.parameters, LOW, HIGH, drive=periodic.Drive(speed=LOW))
 
 
-def test_every_coordinate_has_its_resonance(response: Response) -> None:
+def test_every_coordinate_has_its_resonance(response: periodic.Response) -> None:
     (branch,) = response.branches
     for n, oscillator in enumerate((ACROSS, UPRIGHT)):
         exact = [size(speed, *oscillator) for speed in branch.parameter]
@@ -89,7 +77,7 @@ def test_every_coordinate_has_its_resonance(response: Response) -> None:
         assert top.parameter == pytest.approx(peak(*oscillator), rel=1e-8)
         assert top.amplitude == pytest.approx(size(peak(*oscillator), *oscillator), rel=1e-8)
     assert [(a.risk, a.coordinate) for a in response.speeds_to_avoid] == [
-        (Risk.RESONANCE, "upright position"), (Risk.RESONANCE, "across position"),
+        (periodic.Risk.RESONANCE, "upright position"), (periodic.Risk.RESONANCE, "across position"),
     ]  # fmt: skip
     for avoided, oscillator in zip(response.speeds_to_avoid, (UPRIGHT, ACROSS)):
         half = size(peak(*oscillator), *oscillator) / sqrt(2.0)
@@ -98,9 +86,9 @@ def test_every_coordinate_has_its_resonance(response: Response) -> None:
         )
 
 
-def test_what_moves_the_second_resonance(response: Response) -> None:
+def test_what_moves_the_second_resonance(response: periodic.Response) -> None:
     top = response.maxima()[0]
-    found = special_gradient(response.family, top, ("up.stiffness", "side.stiffness", "up.damping"))
+    found = periodic.special_gradient(response.family, top, ("up.stiffness", "side.stiffness", "up.damping"))
     step = 1e-4
     for name, changed in (("up.stiffness", 0), ("up.damping", 1)):
         up, down = ([v * (1.0 + way * step * (n == changed)) for n, v in enumerate(UPRIGHT)] for way in (1, -1))
@@ -110,7 +98,7 @@ def test_what_moves_the_second_resonance(response: Response) -> None:
     assert found.amplitude.value == pytest.approx(top.amplitude)
 
 
-def test_table_and_picture_show_all_coordinates(response: Response) -> None:
+def test_table_and_picture_show_all_coordinates(response: periodic.Response) -> None:
     columns = response.branches[0].columns()
     for name in ("amplitude", "mean", "harmonic 1"):
         assert {f"{name} of across position [m]", f"{name} of upright position [m]"} <= columns.keys()
@@ -131,11 +119,10 @@ def test_two_unstable_branches_on_one_another_are_drawn_once() -> None:
 
     x = np.linspace(1.0, 2.0, 60)
     rho = np.where((x > 1.3) & (x < 1.7), 2.0, 0.5)
-    pair: list[Branch] = [branch(x, 1.0 + x, rho), branch(x, 1.0 + x, 2.0), branch(x, 1.4 + x, 2.0)]
-    (main, *_) = figures.picture(Response(branches=tuple(pair), low=1.0, high=2.0, problems=())).parts
-    dashed = [
-        np.asarray(curve.y, dtype=float) for curve in main.curves if curve.line == "--" and len(np.atleast_1d(curve.y))
-    ]
+    pair: list[periodic.Branch] = [branch(x, 1.0 + x, rho), branch(x, 1.0 + x, 2.0), branch(x, 1.4 + x, 2.0)]
+    (main, *_) = figures.picture(periodic.Response(branches=tuple(pair), low=1.0, high=2.0, problems=())).parts
+    dashed = [np.asarray(curve.y, dtype=float) for curve in main.curves if curve.line == "--"]
+    dashed = [y for y in dashed if len(np.atleast_1d(y))]
     drawn = np.array([np.isfinite(y) for y in dashed])
     assert drawn[2].all()
     assert not (drawn[0] & drawn[1]).any()
@@ -162,15 +149,15 @@ def test_a_coordinate_that_does_not_move_has_no_resonance() -> None:
     train.spring("coupling", bodies=("crank", "drum"), stiffness="50 N*m/rad", damping="1 N*m*s/rad")
     train.spring("brake", at="K", damping="0.5 N*m*s/rad")
     made = train.freedom("crank", "A", speed="60 rpm").freedom("drum", "K", driven=False).mechanism()
-    response = frequency_response(made.first_set.parameters, 5.0, 30.0)
+    response = periodic.frequency_response(made.first_set.parameters, 5.0, 30.0)
     assert not response.branches[0].amplitudes.any()
     assert response.maxima() == response.speeds_to_avoid == ()
 
 
 def test_without_damping_rounding_makes_no_torus_points(shaker: Case) -> None:
     still = replace(shaker.parameters, side_damping=0.0, up_damping=0.0)
-    (branch,) = frequency_response(still, 300.0 * pi / 30.0, 420.0 * pi / 30.0).branches
-    assert set(branch.stability()) == {Stability.MARGINAL}
+    (branch,) = periodic.frequency_response(still, 300.0 * pi / 30.0, 420.0 * pi / 30.0).branches
+    assert set(branch.stability()) == {periodic.Stability.MARGINAL}
     assert branch.special == ()
 
 
@@ -182,13 +169,13 @@ def test_one_freedom_that_excites_itself_has_torus_points_at_a_prescribed_speed(
     table.slide("X", body="table", through="O")
     table.spring("spring", at="X", law="k*x - (c - d*x**2)*v", constants={"k": 1000.0, "c": 2.0, "d": 4000.0})
     made = table.freedom("rotor", "A", speed="100 rpm").freedom("table", "X").mechanism()
-    response = frequency_response(made.first_set.parameters, 9.0, 11.0)
+    response = periodic.frequency_response(made.first_set.parameters, 9.0, 11.0)
     points = response.branches[0].special
-    assert [point.kind for point in points] == 2 * [Crossing.TORUS]
+    assert [point.kind for point in points] == 2 * [periodic.Crossing.TORUS]
     for point in points:
         assert np.mean(point.orbit.turn()["table.position"] ** 2) == pytest.approx(2.0 / 4000.0, rel=1e-8)
-        assert normal_form(response.family, point).words == "supercritical"
-    lost = [(each.low, each.high) for each in response.speeds_to_avoid if each.risk is Risk.UNSTABLE]
+        assert periodic.normal_form(response.family, point).words == "supercritical"
+    lost = [(each.low, each.high) for each in response.speeds_to_avoid if each.risk is periodic.Risk.UNSTABLE]
     assert lost == [(9.0, points[0].parameter), (points[1].parameter, 11.0)]
 
 
@@ -220,7 +207,7 @@ def test_a_drum_behind_a_gear_and_elastic_shafts_has_its_resonance() -> None:
     built.spring("first", bodies=("rotor", "pinion"), stiffness=4000.0, damping=0.5)
     built.spring("second", bodies=("wheel", "drum"), stiffness=9000.0, damping=0.8)
     built.freedom("rotor", "A", speed="300 rpm").freedom("pinion", "K", driven=False).freedom("drum", "L", driven=False)
-    response = frequency_response(built.mechanism().first_set, "1500 rpm", "1640 rpm")
+    response = periodic.frequency_response(built.mechanism().first_set, "1500 rpm", "1640 rpm")
     (drum,) = (top for top in response.maxima() if top.coordinate == 1)
     speeds = np.linspace(1565.0, 1578.0, 5201) * RAD_S_PER_RPM
     turning, g = 0.4j * speeds[:, None, None], -0.4
@@ -231,7 +218,7 @@ def test_a_drum_behind_a_gear_and_elastic_shafts_has_its_resonance() -> None:
     swing = np.abs(np.linalg.solve(stiffness + turning * damping + turning**2 * mass, load))[:, 1, 0]
     assert drum.parameter == pytest.approx(speeds[swing.argmax()], rel=1e-4)
     assert drum.amplitude == pytest.approx(swing.max(), rel=1e-3)
-    assert {avoided.risk for avoided in response.speeds_to_avoid} == {Risk.RESONANCE}
+    assert {avoided.risk for avoided in response.speeds_to_avoid} == {periodic.Risk.RESONANCE}
 
 
 #: A four-bar whose shaft twists, whose coupler bends and whose rocker stretches.
@@ -270,7 +257,7 @@ def test_starts_of_elastic_bodies_that_would_take_for_ever(tmp_path: Path) -> No
     path = tmp_path / "elastic.toml"
     path.write_text(ELASTIC, encoding="utf-8")
     case = load_case(path)
-    drive = steady_drive(case.parameters, case.inputs, case.initial)
+    drive = periodic.steady_drive(case.parameters, case.inputs, case.initial)
     point = operating_point(case.parameters, drive)
     ranges = start_ranges(case.parameters, drive, first_guess(point.flow, drive, None))
     assert max(abs(bound[0]) for bound in ranges) < pi
@@ -278,4 +265,4 @@ def test_starts_of_elastic_bodies_that_would_take_for_ever(tmp_path: Path) -> No
     rows = np.empty((1, 42))
     status = segments(point.section(start, VARIATIONAL, tolerance=1e-6), np.array([0.0, 0.2]), start[None], rows)
     assert status == Status.NO_STEP
-    assert find_orbit(case.parameters, case.inputs).verdict().stability is Stability.STABLE
+    assert find_orbit(case.parameters, case.inputs).verdict().stability is periodic.Stability.STABLE

@@ -80,9 +80,8 @@ def test_continuation_turns_the_rod_without_spin() -> None:
         found = follow(parameters(20.0, 232.0), np.linspace(0.0, 2.0 * pi, steps + 1), 6.0 * INCH)
         rods = found.rod_frame.real
         turns = rods[1:] @ np.swapaxes(rods[:-1], 1, 2)
-        vectors = 0.5 * np.stack(
-            [turns[:, 2, 1] - turns[:, 1, 2], turns[:, 0, 2] - turns[:, 2, 0], turns[:, 1, 0] - turns[:, 0, 1]], -1
-        )
+        skew = turns - np.swapaxes(turns, 1, 2)
+        vectors = 0.5 * np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], -1)
         along = np.abs(np.sum(vectors * (rods[1:, :, 0] + rods[:-1, :, 0]), -1)) / 2.0
         spins.append(along.max())
         assert np.linalg.norm(vectors, axis=-1).max() > 1e2 * along.max()
@@ -125,9 +124,8 @@ def test_newtons_method_converges_quadratically_from_open_loops(monkeypatch: pyt
     monkeypatch.setattr(C, "residuals", recorded)
     monkeypatch.setattr(C, "planar_loops", disturbed)
     found = close(p, 0.7, 9.0 * INCH)
-    assert found.slider_position[0] == pytest.approx(
-        kinematics.position(0.7, 9.0 * INCH, p.constants()).s4, rel=0.0, abs=1e-13
-    )
+    by_plant = kinematics.position(0.7, 9.0 * INCH, p.constants()).s4
+    assert found.slider_position[0] == pytest.approx(by_plant, rel=0.0, abs=1e-13)
     assert errors[0] > 0.3
     large = [error for error in errors if error > 1e-12]
     assert len(large) >= 4

@@ -198,9 +198,8 @@ def test_poles_are_cut_off_and_reported() -> None:
 
 
 def test_samples_of_a_monte_carlo() -> None:
-    turn = force_turn(
-        parameters(10.0), crank_speed=CRANK_SPEED, shift=ConstantShift(3.5 * INCH), angles=ANGLES, torque=CRANK_TORQUE
-    )
+    given = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
+    turn = force_turn(parameters(10.0), **given, angles=ANGLES, torque=CRANK_TORQUE)
     tolerances = [Tolerance("guide.offset", 5e-4), Tolerance(SHIFT, 5e-4, distribution="uniform")]
     found = monte_carlo(turn, tolerances, samples=3000, quantities=("slider.position", "slider.load"))
     at = found.place("slider.position", radians(31.0))

@@ -34,6 +34,7 @@ from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
+from tests.refusals import refused
 
 from ..published_rahman import DEAD_CENTRES_DEG, GREATEST_SHIFTS_IN, INCH
 from ..slider_cranks import Case, cases, components, seeded
@@ -57,14 +58,9 @@ class Prescribed(NamedTuple):
 
 def turn_of(case: Case, **given: Any) -> ForceTurn:
     th, s1, w, v, _, _ = case.state
-    return force_turn(
-        case.parameters,
-        crank_speed=w,
-        crank_acceleration=case.acceleration,
-        shift=Prescribed(ShiftMotion(s1, v, case.shift_acceleration)),
-        angles=[th],
-        **given,
-    )
+    shift = Prescribed(ShiftMotion(s1, v, case.shift_acceleration))
+    driven = {"crank_speed": w, "crank_acceleration": case.acceleration}
+    return force_turn(case.parameters, **driven, shift=shift, angles=[th], **given)
 
 
 def relative(found: Any, true: Any, scale: float = 0.0) -> float:
@@ -111,8 +107,7 @@ def test_the_load_that_is_found_keeps_the_motion_under_the_torque(case: Case) ->
         return
     inputs = case.inputs("torque-shift")._replace(load=float(turn.slider_force[0]), force=0.0)
     m = dynamics.motion(q, k, x, inputs, p)
-    assert turn.sought == "slider force"
-    assert turn.torque[0] == case.torque
+    assert (turn.sought, turn.torque[0]) == ("slider force", case.torque)
     scale = abs(case.acceleration) + (abs(case.torque) + abs(inputs.load * k.kth)) / dynamics.inertia(q, k, p).m11
     assert abs(m.crank_acceleration - case.acceleration) < 1e-9 * scale
     assert_forces(turn, dynamics.reactions(q, x, m, inputs, p), p, 1e-8)
@@ -123,30 +118,25 @@ def test_the_load_that_is_found_keeps_the_motion_under_the_torque(case: Case) ->
 def test_agrees_with_the_dual_vectors_of_the_thesis_in_every_frame(seed: int, sought: str) -> None:
     case = seeded(seed)
     # what the dual vectors call the slider's force is all along the guide: without friction and spring it is the load
-    mechanism = replace(
-        case.parameters, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0, shift_stiffness=0.0
-    )
+    free = dict.fromkeys(("slider_stiffness", "slider_damping", "slider_coulomb_friction", "shift_stiffness"), 0.0)
+    mechanism = replace(case.parameters, **free)
     at = np.linspace(case.state[0] - 0.05, case.state[0] + 0.05, 7)
     law = GrooveShift(0.02, 0.7)
     w, e = case.state[2], case.acceleration
     given: dict[str, Any] = {"torque": case.torque} if sought == "slider force" else {"load": case.load}
     s1 = case.state[1]
-    shifted = AngleShift(
-        lambda th: s1 + law.at(th, 1.0, 0.0).shift,
-        lambda th: law.at(th, 1.0, 0.0).velocity,
-        lambda th: law.at(th, 1.0, 0.0).acceleration,
-    )
+
+    def at_unit_speed(th: Any) -> ShiftMotion:
+        return law.at(th, 1.0, 0.0)
+
+    motion = (lambda th: s1 + at_unit_speed(th).shift, lambda th: at_unit_speed(th).velocity)
+    shifted = AngleShift(*motion, lambda th: at_unit_speed(th).acceleration)
     turn = force_turn(mechanism, crank_speed=w, crank_acceleration=e, shift=shifted, angles=at, partial=True, **given)
     assert len(turn) > 3
     known = {"torque": case.torque} if sought == "slider force" else {"slider_force": case.load}
-    loads = joint_loads(
-        close(mechanism, turn.angle, turn.shift),
-        speed=w,
-        shift_velocity=turn.shift_velocity,
-        acceleration=e,
-        shift_acceleration=turn.shift_acceleration,
-        **known,
-    )
+    shifting = {"shift_velocity": turn.shift_velocity, "shift_acceleration": turn.shift_acceleration}
+    closed = close(mechanism, turn.angle, turn.shift)
+    loads = joint_loads(closed, speed=w, acceleration=e, **shifting, **known)
     level = float(np.abs(loads.crank_pin).max())
     assert relative(turn.torque, loads.torque, level * mechanism.crank_length) < 1e-9
     assert relative(turn.slider_force, loads.slider_force, level) < 1e-9
@@ -171,9 +161,8 @@ def test_groove_in_the_shaft_is_the_plants() -> None:
         assert turn.applied_axial_force[i] == pytest.approx(m.groove_force, rel=1e-12)
         assert turn.shift_acceleration[i] == pytest.approx(m.shift_acceleration, rel=1e-12)
         assert turn.shift[i] == pytest.approx(0.05 * np.sin(1.5 * th), rel=1e-14)
-    back = force_turn(
-        mechanism, crank_speed=4.0, crank_acceleration=7.0, shift=law, angles=[0.4, 1.9], torque=turn.torque.data
-    )
+    driven = {"crank_speed": 4.0, "crank_acceleration": 7.0}
+    back = force_turn(mechanism, **driven, shift=law, angles=[0.4, 1.9], torque=turn.torque.data)
     assert relative(back.slider_force, [5.0, 5.0]) < 1e-9
 
 
@@ -194,10 +183,9 @@ def test_laws_are_one_another(branch: int) -> None:
         lambda t: amplitude * f * np.cos(f * t),
         lambda t: -amplitude * f * f * np.sin(f * t),
     )
-    turns = [
-        force_turn(mechanism, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
-        for law in (groove, angle, time)
-    ]
+    angles = np.linspace(0.0, tau, 97)
+    driven = {"crank_speed": w, "torque": CRANK_TORQUE, "angles": angles}
+    turns = [force_turn(mechanism, shift=law, **driven) for law in (groove, angle, time)]
     for turn in turns[1:]:
         for name in ("shift", "shift_velocity", "shift_acceleration", "slider_force"):
             assert relative(getattr(turn, name), getattr(turns[0], name)) < 1e-9
@@ -259,10 +247,8 @@ def test_at_a_dead_centre_values_are_masked_with_the_reason() -> None:
             mask = np.ma.getmaskarray(turn.vector(name, frame))
             assert (mask == (dead & (name != "guide_moment"))[:, None]).all()
     assert not np.ma.getmaskarray(turn.torque).any()
-    assert [text.partition(":")[0] for text in turn.mask_reasons] == [
-        "dead centre at crank angle 90.0000 deg",
-        "dead centre at crank angle 270.0000 deg",
-    ]
+    places = [text.partition(":")[0] for text in turn.mask_reasons]
+    assert places == [f"dead centre at crank angle {angle}.0000 deg" for angle in (90, 270)]
     assert "no lever" in turn.mask_reasons[0]
     assert [c.crank_angle for c in turn.dead_centres] == pytest.approx([0.5 * pi, 1.5 * pi], abs=1e-12)
     assert turn.vector("guide_moment")[90].tolist() == [0.0, 0.0, 0.0]
@@ -335,8 +321,7 @@ def test_limits_of_assembly_are_where_the_cosine_says() -> None:
     assert centres[0] == pytest.approx(centres[1], abs=1e-9)
     # both ends between two of the angles: no angle is left out, and there is a break all the same
     coarse = force_turn(mechanism, crank_speed=1.0, shift=SHIFT, angles=[0.0, 2.0, tau - 2.0, tau], load=1.0)
-    assert coarse.unreachable.size == 0
-    assert coarse.breaks == (1,)
+    assert (coarse.unreachable.size, coarse.breaks) == (0, (1,))
     whole = force_turn(OFFSET, crank_speed=1.0, shift=SHIFT, load=1.0)
     assert (whole.limits, whole.breaks) == ((), ())
     assert whole.clear().all()
@@ -358,14 +343,12 @@ def test_runs_of_masked_angles_are_reported_once() -> None:
     still = force_turn(parameters(0.0, 180.0), crank_speed=1.0, shift=SHIFT, torque=1.0)
     assert np.ma.getmaskarray(still.slider_force).sum() == 361
     assert still.without_lever
-    assert still.mask_reasons == (
-        "the slider has no lever on the crank at any angle, so that the torque determines no force on it",
-    )
+    (reason,) = still.mask_reasons
+    assert reason == "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
     ideal = force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[1.0, 0.5 * pi, 0.5 * pi + 1e-12, 1.5 * pi])
     assert not ideal.without_lever
-    assert [text.partition(":")[0] for text in ideal.mask_reasons] == [
-        "dead centre at all 3 crank angles from 90.0000 to 270.0000 deg"
-    ]
+    (place,) = (text.partition(":")[0] for text in ideal.mask_reasons)
+    assert place == "dead centre at all 3 crank angles from 90.0000 to 270.0000 deg"
     assert not force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[0.5 * pi]).without_lever
 
 
@@ -435,12 +418,8 @@ def test_wrong_input_is_reported(changes: dict[str, Any], message: str) -> None:
 
 def test_wrong_names_are_reported() -> None:
     turn = force_turn(OFFSET, crank_speed=1.0, angles=[0.0])
-    with pytest.raises(InputError, match="no joint force or moment 'pin'"):
-        turn.vector("pin")
-    with pytest.raises(InputError, match="no frame 5"):
-        turn.vector("bearing", 5)
-    with pytest.raises(InputError, match="no units 'cgs'"):
-        turn.columns("cgs")
+    refused(InputError, "no joint force or moment 'pin'", turn.vector, "pin")
+    refused(InputError, "no frame 5", turn.vector, "bearing", 5)
+    refused(InputError, "no units 'cgs'", turn.columns, "cgs")
     for law in (ConstantShift, GrooveShift):
-        with pytest.raises(InputError, match="finite"):
-            law(np.inf)
+        refused(InputError, "finite", law, np.inf)

@@ -29,15 +29,8 @@ def turns_fully(par: SliderCrankParameters, law: M.PeriodicShift) -> bool:
 
 
 def mechanism(a1: float, a2: float, a4: float, twist: float, branch: int = 1) -> SliderCrankParameters:
-    return SliderCrankParameters(
-        crank_length=a1,
-        rod_length=a2,
-        guide_offset=a4,
-        guide_twist=twist,
-        crank_mass=1.0,
-        crank_inertia=1.0,
-        assembly_branch=branch,
-    )
+    lengths = {"crank_length": a1, "rod_length": a2, "guide_offset": a4, "guide_twist": twist}
+    return SliderCrankParameters(**lengths, crank_mass=1.0, crank_inertia=1.0, assembly_branch=branch)
 
 
 @st.composite
@@ -71,9 +64,8 @@ def general(count: int) -> Iterator[tuple[SliderCrankParameters, float]]:
 
 def squares(par: SliderCrankParameters, shift: np.ndarray | float, angles: np.ndarray) -> np.ndarray:
     """Square of the rod's length less that of the crank pin's distance from the guide, by the distance in space."""
-    pin = np.stack(
-        [par.crank_length * np.cos(angles), par.crank_length * np.sin(angles), shift + 0.0 * angles], axis=-1
-    )
+    c, s = np.cos(angles), np.sin(angles)
+    pin = np.stack([par.crank_length * c, par.crank_length * s, shift + 0.0 * angles], axis=-1)
     arm = pin + np.array([par.guide_offset, 0.0, 0.0])
     way = np.array([0.0, sin(par.guide_twist), cos(par.guide_twist)])
     return par.rod_length**2 - (np.cross(arm, way) ** 2).sum(axis=-1)
@@ -287,9 +279,8 @@ def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.PeriodicS
             assert place.shift == pytest.approx(law.at(place.crank_angle)[0], abs=1e-12)
             # rounding of the angle is a root of it at the limit of assembly
             root = max(0.0, squares(par, place.shift, np.array([place.crank_angle]))[0])
-            foot = -par.crank_length * sin(place.crank_angle) * sin(par.guide_twist) - place.shift * cos(
-                par.guide_twist
-            )
+            th, twist = place.crank_angle, par.guide_twist
+            foot = -par.crank_length * sin(th) * sin(twist) - place.shift * cos(twist)
             assert place.slider_position == pytest.approx(foot + par.assembly_branch * sqrt(root), abs=1e-6)
 
 
@@ -319,9 +310,8 @@ def test_strokes_by_twist(twist_deg: float) -> None:
 @pytest.mark.parametrize("offset_in", rahman.DEAD_CENTRES_DEG)
 def test_dead_centres_of_the_thesiss_mechanism(offset_in: float) -> None:
     outer, inner = M.dead_centres(published.parameters(offset_in), STILL)
-    assert (degrees(outer.crank_angle), degrees(inner.crank_angle)) == pytest.approx(
-        rahman.DEAD_CENTRES_DEG[offset_in], abs=6e-3
-    )
+    angles = (degrees(outer.crank_angle), degrees(inner.crank_angle))
+    assert angles == pytest.approx(rahman.DEAD_CENTRES_DEG[offset_in], abs=6e-3)
     assert (outer.outer, inner.outer) == (True, False)
     assert outer.slider_position / INCH == pytest.approx(sqrt(62.0**2 - offset_in**2), abs=1e-12)
     assert inner.slider_position / INCH == pytest.approx(sqrt(38.0**2 - offset_in**2), abs=1e-12)

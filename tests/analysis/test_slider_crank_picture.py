@@ -200,8 +200,7 @@ class TestAnimation:
             OFFSET, tmp_path / "a" / "turn.gif", law=constant_shift(0.0889), frames=4, title="turn"
         )
         found = self.frames(path)
-        assert len(found) == 4
-        assert len({frame.shape for frame in found}) == 1
+        assert (len(found), len({frame.shape for frame in found})) == (4, 1)
         for a, b in pairwise(found):
             assert np.abs(a - b).max() > 50.0
 

@@ -22,6 +22,7 @@ from linkwork.slider_crank import published
 from linkwork.slider_crank.dynamics import inertia
 from linkwork.slider_crank.kinematics import coefficients, position
 from linkwork.slider_crank.parameters import InitialState, SliderCrankParameters
+from tests.refusals import refused
 
 CASES = {name: case for name, case in CHECKS.items() if name.startswith("slider-crank")}
 PARAMETERS, INITIAL = published.OFFSET_CASE
@@ -117,10 +118,8 @@ def test_momentum_gained_is_the_impulse_of_the_forces_from_outside(name: str) ->
 def test_power_of_the_drives_is_what_the_energy_gains() -> None:
     inputs = Inputs(speed=Harmonics(4.0, [1.0], [3.0], [0.2]), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0]))
     result = simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=1.2, step=2e-4, tolerance=1e-11)
-    power = (
-        result["drive.applied_torque"] * result["crank.speed"]
-        + result["axial.applied_force"] * result["shift.velocity"]
-    )
+    torque = result["drive.applied_torque"]
+    power = torque * result["crank.speed"] + result["axial.applied_force"] * result["shift.velocity"]
     work = CubicSpline(result.time, power).antiderivative()(result.time)
     energy = result["energy.kinetic"] + result["energy.potential"]
     assert np.abs(energy - energy[0] - work).max() < 1e-9 * np.ptp(energy)
@@ -171,10 +170,8 @@ def test_jump_of_the_axial_speed_moves_the_free_crank(method: str) -> None:
 
 
 def test_events_are_found_on_outputs_of_the_slider_crank() -> None:
-    events = [
-        Event(name="dead centre", output="slider.velocity", direction=-1),
-        Event(name="turn", function=lambda t, th, s, w, v: th - 2.0 * pi, stop=True),
-    ]
+    turn = Event(name="turn", function=lambda t, th, s, w, v: th - 2.0 * pi, stop=True)
+    events = [Event(name="dead centre", output="slider.velocity", direction=-1), turn]
     planar = published.parameters(10.0)
     result = simulate(planar, Inputs(speed=SPEED), stop_time=3.0, step=0.1, events=events)
     assert [event.name for event in result.events] == ["dead centre", "turn"]
@@ -239,12 +236,9 @@ def test_what_is_not_usable_is_refused(arguments: dict[str, Any], error: type, s
 
 
 def test_a_freedom_has_one_drive() -> None:
-    with pytest.raises(InputError, match="both shift_speed and groove are given"):
-        Inputs(shift_speed=1.0, groove=True)
-    with pytest.raises(InputError, match="both shift_speed and axial_force"):
-        Inputs(shift_speed=1.0, axial_force=1.0)
-    with pytest.raises(InputError, match="both speed and torque"):
-        Inputs(speed=1.0, torque=1.0)
+    refused(InputError, "both shift_speed and groove are given", Inputs, shift_speed=1.0, groove=True)
+    refused(InputError, "both shift_speed and axial_force", Inputs, shift_speed=1.0, axial_force=1.0)
+    refused(InputError, "both speed and torque", Inputs, speed=1.0, torque=1.0)
     with pytest.raises(InputError, match="a shift_speed given as a Function needs its rate"):
         Inputs(shift_speed=Function(lambda t, th, s, w, v: 0.0))
     with pytest.raises(InputError, match="load has more than one Function"):

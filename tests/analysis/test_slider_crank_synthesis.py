@@ -31,13 +31,9 @@ def slider_cranks(draw: st.DrawFn) -> syn.SliderCrank:
     # joined somewhere, and not next to where the crank just comes to turn
     assume(abs(offset) < 0.95 * (crank + coupler))
     assume(min(abs(abs(offset) + crank - coupler), abs(abs(abs(offset) - crank) - coupler)) > 0.02)
-    return syn.SliderCrank(
-        ground_length=offset,
-        crank_length=crank,
-        coupler_length=coupler,
-        crank_phase=draw(st.floats(-3.0, 3.0)),
-        branch=draw(st.sampled_from([1, -1])),
-    )
+    links = {"ground_length": offset, "crank_length": crank, "coupler_length": coupler}
+    phase, branch = draw(st.floats(-3.0, 3.0)), draw(st.sampled_from([1, -1]))
+    return syn.SliderCrank(**links, crank_phase=phase, branch=branch)
 
 
 def slider(linkage: syn.SliderCrank, rotation: Any) -> FloatArray:
@@ -107,10 +103,8 @@ def test_the_greatest_error_of_a_slider_crank_is_made_small(body: bool) -> None:
     """Of a function of the slider, and of a body that is carried by the coupler."""
     points = np.column_stack([0.2 + 0.1 * np.cos(PHI[:8]), 0.15 + 0.05 * np.sin(PHI[:8])])
     task = syn.Motion(points=points, angle=np.linspace(0.0, 0.5, 8), rotation=PHI[:8]) if body else TASK
-    plain, flat = (
-        syn.synthesize(replace(task, objective=objective), kinds=("slider-crank",), search=QUICK).best
-        for objective in ("error", "worst")
-    )
+    tasks = (replace(task, objective=objective) for objective in ("error", "worst"))
+    plain, flat = (syn.synthesize(one, kinds=("slider-crank",), search=QUICK).best for one in tasks)
     assert flat.value == pytest.approx(flat.evaluation.worst)
     assert flat.value < 0.99 * plain.evaluation.worst
     # several are the greatest at once
@@ -155,9 +149,8 @@ def test_the_forces_are_those_of_the_spatial_plant(branch: int, offset: float, a
     make = replace(MAKE, load=(0.0, 0.0))
     ran = syn.pin_forces(linkage, make)
     start = InitialState(crank_angle=linkage.crank_phase)
-    run = simulate(
-        make.slider_crank(linkage), Inputs(speed=make.speed), initial=start, samples=ran.rotation / make.speed
-    )
+    times = ran.rotation / make.speed
+    run = simulate(make.slider_crank(linkage), Inputs(speed=make.speed), initial=start, samples=times)
     np.testing.assert_allclose(run["slider.position"], linkage.slider_position(ran.rotation), atol=1e-9)
     for pin, name in zip("ABCD", ("bearing", "crank_pin", "slider_pin", "guide"), strict=True):
         wanted = np.hypot(run[f"{name}.fx"], run[f"{name}.fy"])
@@ -182,9 +175,8 @@ def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
         most = np.hypot(run[f"{name}.fx"], run[f"{name}.fy"]).max()
         assert most == pytest.approx(wanted["ABCD".index(pin)], rel=1e-4)
     described = read_case(syn.described_case(held, MAKE, "runs"), folder=tmp_path)
-    run = simulate(
-        described.parameters, described.inputs, initial=described.initial, stop_time=2.0 * pi / MAKE.speed, step=1e-4
-    )
+    times = {"stop_time": 2.0 * pi / MAKE.speed, "step": 1e-4}
+    run = simulate(described.parameters, described.inputs, initial=described.initial, **times)
     assert np.hypot(run["C.fx"], run["C.fy"]).max() == pytest.approx(wanted[2], rel=1e-4)
     text = report(held)
     assert "slider at rest at crank rotations of" in text

@@ -132,10 +132,8 @@ class TestThesis:
     def test_removing_damping_of_appendix_4(self) -> None:
         def greatest(omega_c: float) -> float:
             """Growth of the worst motion over half a turn of 4 pi, less 1."""
-            equations = [
-                slider_equation(chapter_4(1.5, omega_c), (1000.0 / x) ** 0.5, variant=Variant.FORTRAN)
-                for x in np.linspace(0.274, 0.279, 26).tolist()
-            ]
+            table, speeds = chapter_4(1.5, omega_c), np.sqrt(1000.0 / np.linspace(0.274, 0.279, 26)).tolist()
+            equations = [slider_equation(table, speed, variant=Variant.FORTRAN) for speed in speeds]
             matrices = monodromies([e.homogeneous().stiffened(e.spring) for e in equations])
             return float(np.abs(np.linalg.eigvals(matrices)).max() - 1.0)
 
@@ -163,10 +161,8 @@ class TestThesis:
             assert forces[-1].amplitudes[2] == pytest.approx(size, abs=5e-6)
 
         def greatest(force: FourierSeries, damping: float = 0.2) -> float:
-            equations = (
-                replace(right, force=force, spring=1000.0 / w**2, damping=damping / w)
-                for w in np.arange(15.2, 15.4, 0.005).tolist()
-            )
+            speeds = np.arange(15.2, 15.4, 0.005).tolist()
+            equations = (replace(right, force=force, spring=1000.0 / w**2, damping=damping / w) for w in speeds)
             return max(two_harmonics(e).harmonic(2) for e in equations)
 
         whole, _, halved = map(greatest, forces)
@@ -195,10 +191,9 @@ class TestThesis:
         assert np.log2(waves[0] / waves[1]) == pytest.approx(3.0, abs=0.2)
 
     def test_the_programs_lose_k0(self) -> None:
-        series, appendix_2, appendix_4 = (
-            slider_equation(chapter_4(1.0, 0.5), 40.0, variant=Variant.FORTRAN, form=f)
-            for f in (Form.SERIES, Form.RESONANCE, Form.STABILITY)
-        )
+        table, forms = chapter_4(1.0, 0.5), (Form.SERIES, Form.RESONANCE, Form.STABILITY)
+        series, *others = (slider_equation(table, 40.0, variant=Variant.FORTRAN, form=f) for f in forms)
+        appendix_2, appendix_4 = others
         k0 = series.spring_factor.mean
         assert k0 == pytest.approx(0.94, abs=0.01)
         lost = series.spring_factor * (1.0 / k0)
@@ -269,9 +264,8 @@ class TestGeneralMechanism:
         k = kinematics.coefficients(g, p)
         m = dynamics.motion(g, k, case.state, i, p)
         found = balance(th2, u, v, m.slider_acceleration, w, p, Load(i.load_x, i.load_y, i.force))
-        assert float(found.force) == pytest.approx(
-            0.0, abs=1e-10 * (1.0 + abs(found.by_acceleration * m.slider_acceleration))
-        )
+        size = abs(found.by_acceleration * m.slider_acceleration)
+        assert float(found.force) == pytest.approx(0.0, abs=1e-10 * (1.0 + size))
         assert float(found.torque) == pytest.approx(m.torque, rel=1e-10)
 
     @pytest.mark.parametrize("free", [0.0, 0.01])

@@ -17,7 +17,7 @@ from analysis.synthesis.result.report import displacements
 from analysis.synthesis.search.program import Program, make_linkage, make_start, random_pivot
 from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
-from tests.linkages import drawn
+from tests.linkages import drawn, outline
 
 pytest.importorskip("casadi")
 
@@ -130,13 +130,8 @@ def test_without_harmonics_the_slider_is_set_once() -> None:
 def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
     previous = moved(1)
     for harmonics in (2, 3, 4):
-        found = slider_motion(
-            WEIGHTED.task,
-            PRINTED,
-            syn.SliderUnknown(harmonics=harmonics),
-            guesses=[previous.best.linkage],
-            search=syn.Search(starts=4),
-        )
+        guess, unknown = previous.best.linkage, syn.SliderUnknown(harmonics=harmonics)
+        found = slider_motion(WEIGHTED.task, PRINTED, unknown, guesses=[guess], search=syn.Search(starts=4))
         assert found.best.error <= previous.best.error * (1.0 + 1e-9)
         previous = found
     assert shown(previous) < 0.3
@@ -144,9 +139,8 @@ def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
 
 def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
     guess = moved(2).best.linkage
-    found = slider_motion(
-        WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=2), guesses=[guess], search=syn.Search(starts=0)
-    )
+    unknown, search = syn.SliderUnknown(harmonics=2), syn.Search(starts=0)
+    found = slider_motion(WEIGHTED.task, PRINTED, unknown, guesses=[guess], search=search)
     assert found.starts == 1
     assert found.best.error <= moved(2).best.error * (1.0 + 1e-9)
 
@@ -161,13 +155,9 @@ def test_a_motion_is_not_worse_than_the_slider_at_rest() -> None:
         branch=-1,
     )  # fmt: skip
     fixed = syn.Solution.from_linkage(syn.TimedPath(points=points), linkage)
-    found = slider_motion(
-        fixed.task,
-        linkage,
-        syn.SliderUnknown(harmonics=0, stroke=0.02),
-        constraints=[syn.LeastTransmission(angle=radians(29.99))],
-        search=syn.Search(starts=3),
-    )
+    unknown = syn.SliderUnknown(harmonics=0, stroke=0.02)
+    limits = [syn.LeastTransmission(angle=radians(29.99))]
+    found = slider_motion(fixed.task, linkage, unknown, constraints=limits, search=syn.Search(starts=3))
     assert found.best.error <= fixed.error * (1.0 + 1e-9)
 
 
@@ -270,9 +260,8 @@ def test_a_bound_is_kept_and_is_reached(name: str) -> None:
     """It is held at so many rotations, and by so much the more tightly, that it is passed nowhere."""
     bound, value, _, result = bounded(name)
     assert 0.995 * bound <= value <= bound * (1.0 + 1e-6)
-    assert (
-        shown(moved(2)) < shown(result) < shown(slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=0)))
-    )
+    still = slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=0))
+    assert shown(moved(2)) < shown(result) < shown(still)
 
 
 def test_the_position_is_kept_within_its_bounds() -> None:
@@ -301,9 +290,8 @@ def test_the_guide_is_fixed_bounded_or_free() -> None:
 
 def test_the_links_keep_their_transmission_angle() -> None:
     angle = radians(35.0)
-    found = slider_motion(
-        WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=2), constraints=(syn.LeastTransmission(angle=angle),)
-    )
+    limit = syn.LeastTransmission(angle=angle)
+    found = slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=2), constraints=[limit])
     # a margin of 0.15 degrees is for what lies between the rotations that are looked at
     assert angle <= found.best.linkage.least_transmission <= angle + radians(0.16)
     assert moved(2).best.linkage.least_transmission < radians(25.0)
@@ -314,21 +302,14 @@ def test_the_links_keep_their_transmission_angle() -> None:
 
 
 def test_links_and_slider_together_beat_either() -> None:
-    bounds = {
-        name: (0.5 * getattr(PRINTED, name), 2.0 * getattr(PRINTED, name))
-        for name in ("crank_length", "coupler_length", "rocker_length")
-    }
+    links = {name: getattr(PRINTED, name) for name in ("crank_length", "coupler_length", "rocker_length")}
+    bounds = {name: (0.5 * length, 2.0 * length) for name, length in links.items()}
     bounds |= {"ground_length": (PRINTED.ground_length,) * 2, "crank_phase": (-pi, pi)}
     links = syn.synthesize(WEIGHTED.task, bounds, (syn.FullTurn(),), search=syn.Search(starts=8))
     slider = moved(1)
-    both = slider_motion(
-        WEIGHTED.task,
-        PRINTED,
-        syn.SliderUnknown(harmonics=1),
-        bounds=bounds,
-        guesses=[slider.best.linkage, links.best.linkage],
-        search=syn.Search(starts=6),
-    )
+    guesses = [slider.best.linkage, links.best.linkage]
+    options = {"bounds": bounds, "guesses": guesses, "search": syn.Search(starts=6)}
+    both = slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=1), **options)
     assert both.best.error < 0.5 * min(links.best.error, slider.best.error)
     changed = both.best.linkage
     assert changed.ground_length == pytest.approx(PRINTED.ground_length, rel=1e-14)
@@ -342,8 +323,8 @@ def test_links_and_slider_together_beat_either() -> None:
 
 def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
     t = np.linspace(-1.0, 1.0, 31)
-    path = syn.TargetPath(points=np.column_stack([0.1 * t, 0.02 * np.cos(2.5 * t) + 0.01 * t**3]), closed=False)
-    task = syn.UntimedPath(path=path, measure="distance", samples=36)
+    points = np.column_stack([0.1 * t, 0.02 * np.cos(2.5 * t) + 0.01 * t**3])
+    task = outline(points, closed=False, measure="distance", samples=36)
     four_bar = syn.synthesize(task, search=syn.Search(starts=4, candidates=1 << 12)).best
     found = slider_motion(task, four_bar, syn.SliderUnknown(harmonics=1, stroke=0.05), search=syn.Search(starts=4))
     assert found.best.error <= four_bar.error
@@ -356,10 +337,9 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
 
 
 def test_the_path_of_the_crank_pin_is_left_as_it_is() -> None:
-    pin = syn.Linkage(
-        ground_length=0.16, crank_length=0.05, coupler_length=0.15, rocker_length=0.15, point_distance=0.0
-    )
-    task = syn.UntimedPath(path=syn.TargetPath(points=pin.path(syn.turn(24)) * [0.9, 1.0], closed=True))
+    links = {"ground_length": 0.16, "crank_length": 0.05, "coupler_length": 0.15, "rocker_length": 0.15}
+    pin = syn.Linkage(**links, point_distance=0.0)
+    task = outline(pin.path(syn.turn(24)) * [0.9, 1.0])
     moved = slider_motion(task, pin, syn.SliderUnknown(harmonics=1, stroke=0.02), search=syn.Search(starts=2))
     assert moved.best.error == pytest.approx(syn.evaluate(task, pin).error)
 
@@ -396,8 +376,5 @@ def test_bad_input_is_named() -> None:
         slider_motion(WEIGHTED.task, PRINTED, unknown, search=syn.Search(n_jobs=0))
     with pytest.raises(ParameterError, match="crank_lenght"):
         slider_motion(WEIGHTED.task, PRINTED, unknown, bounds={"crank_lenght": (0.1, 0.2)})
-
-
-def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
     with pytest.raises(InputError, match="require assembly -1, but the linkage has assembly"):
-        slider_motion(WEIGHTED.task, PRINTED, syn.SliderUnknown(harmonics=1), constraints=(syn.Assembly(branch=-1),))
+        slider_motion(WEIGHTED.task, PRINTED, unknown, constraints=(syn.Assembly(branch=-1),))

@@ -11,36 +11,17 @@ import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 
+from analysis import periodic
 from analysis.figures import Curve, HeatMap, Panel, plot_curves
 from analysis.files import WritingError
 from analysis.numerics.boundaries import Box, Reason, chart, find_minimum, scan, trace
-from analysis.periodic import (
-    Drive,
-    GridInterrupted,
-    Outcome,
-    Plane,
-    RemovalError,
-    Stability,
-    confirm,
-    crossing_test,
-    grid,
-    newton_orbit,
-    orbit_test,
-    plane,
-    removing_damping,
-)
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.motion import kernels as orbit_kernels
 from analysis.youssef import PeriodicEquation, hill_regions, linear_test, linear_verdict, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
-from tests.published import (
-    FIRST_REGION,
-    FIRST_REGION_THESIS,
-    REMOVING_DAMPING,
-    REMOVING_DAMPING_READ_OFF,
-    REMOVING_DAMPING_THESIS,
-)
+from tests import published
+from tests.refusals import refused
 
 # long nonlinear runs at I4 = 1, lambda_k^2: the first lies just below appendix 3's region, the others in it; the second is ours
 LONG_RUNS = ((0.2655, "bounded"), (0.2662, "bounded"), (0.26745, "grows"), (0.2695, "bounded"))
@@ -52,62 +33,63 @@ def crank_speed(lambda_k2: float) -> float:
     return sqrt(SQUARE_OF_OMEGA_K / lambda_k2)
 
 
-def first_region_plane(omega_c: float = 0.0) -> Plane:
+def first_region_plane(omega_c: float = 0.0) -> periodic.Plane:
     """lambda_k^2 and I4."""
-    return lambda lambda_k2, inertia_ratio: (chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2)))
+    return lambda lambda_k2, inertia_ratio: (
+        chapter_4(inertia_ratio, omega_c),
+        periodic.Drive(speed=crank_speed(lambda_k2)),
+    )
 
 
 def mathieu(multiplier: int, damping: float = 0.0) -> Callable[[float, float], float]:
-    return lambda p, q: float(crossing_test(monodromy(PeriodicEquation.mathieu(p, q, damping)), multiplier))
+    return lambda p, q: float(periodic.crossing_test(monodromy(PeriodicEquation.mathieu(p, q, damping)), multiplier))
 
 
 # Planes
 
 
 def test_plane_varies_two_parameters_of_mechanism_and_drive() -> None:
-    drive = Drive(speed=44.0, forces={"load.fy": -3.0})
-    operation = plane(TABLE_3_1, drive, "slider.stiffness", "crank.length")
+    drive = periodic.Drive(speed=44.0, forces={"load.fy": -3.0})
+    operation = periodic.plane(TABLE_3_1, drive, "slider.stiffness", "crank.length")
     assert operation(2e3, 0.04) == (replace(TABLE_3_1, slider_stiffness=2e3, crank_length=0.04), drive)
-    assert plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, 5.0) == (
-        replace(TABLE_3_1, slider_damping=5.0),
-        replace(drive, speed=30.0),
-    )
-    assert plane(TABLE_3_1, drive, "slider.force", "load.fx")(2.0, 5.0)[1] == replace(
-        drive, forces={"load.fy": -3.0, "slider.force": 2.0, "load.fx": 5.0}
-    )
+    made = periodic.plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, 5.0)
+    assert made == (replace(TABLE_3_1, slider_damping=5.0), replace(drive, speed=30.0))
+    forces = {"load.fy": -3.0, "slider.force": 2.0, "load.fx": 5.0}
+    made = periodic.plane(TABLE_3_1, drive, "slider.force", "load.fx")(2.0, 5.0)
+    assert made[1] == replace(drive, forces=forces)
     with pytest.raises(InputError, match="two parameters"):
-        plane(TABLE_3_1, drive, "drive.speed", "drive.speed")
+        periodic.plane(TABLE_3_1, drive, "drive.speed", "drive.speed")
     with pytest.raises(ParameterError):
-        plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, -1.0)
+        periodic.plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, -1.0)
 
 
 def test_torque_drive_has_charts_too() -> None:
     rig = SETS["rig-2-spring-c"].parameters
-    operation = plane(rig, Drive(torque=0.01), "drive.torque", "slider.damping")
-    found = grid(operation, np.linspace(0.005, 0.03, 4), np.linspace(5.0, 8.0, 3), start=(0.0, 0.0, 56.0))
+    operation = periodic.plane(rig, periodic.Drive(torque=0.01), "drive.torque", "slider.damping")
+    found = periodic.grid(operation, np.linspace(0.005, 0.03, 4), np.linspace(5.0, 8.0, 3), start=(0.0, 0.0, 56.0))
     assert found.starts.shape == (3, 4, 3)
-    orbit = newton_orbit(*operation(0.03, 8.0), start=found.starts[2, 3])
+    orbit = periodic.newton_orbit(*operation(0.03, 8.0), start=found.starts[2, 3])
     assert found.largest[2, 3] == pytest.approx(orbit.largest, abs=1e-8)
-    run = confirm(*operation(0.03, 8.0), start=found.starts[2, 3], turns=200)
+    run = periodic.confirm(*operation(0.03, 8.0), start=found.starts[2, 3], turns=200)
     assert run.agrees
     assert run.growth == pytest.approx(orbit.largest, rel=1e-3)
     with pytest.raises(InputError, match="by torque"):
-        linear_verdict(rig, Drive(torque=0.01))
+        linear_verdict(rig, periodic.Drive(torque=0.01))
 
 
 def test_a_small_margin_is_given_more_turns() -> None:
     rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.9794)
-    drive = Drive(speed=1169.3 * pi / 30.0)
-    orbit = newton_orbit(rig, drive)
+    drive = periodic.Drive(speed=1169.3 * pi / 30.0)
+    orbit = periodic.newton_orbit(rig, drive)
     assert 0.0 < orbit.verdict().margin < 5e-4
-    run = confirm(rig, drive)
+    run = periodic.confirm(rig, drive)
     assert len(run.deviations) > 2000
     assert run.agrees
     # told too soon the run stays bounded, and its growth is held to the multiplier's
-    assert confirm(rig, drive, turns=500).agrees
+    assert periodic.confirm(rig, drive, turns=500).agrees
     # of a motion that neither decays nor grows within the run the growth has to be that of its multiplier
     margin = run.verdict.margin
-    slow = replace(run, outcome=Outcome.BOUNDED, growth=1.0 - 1.05 * margin)
+    slow = replace(run, outcome=periodic.Outcome.BOUNDED, growth=1.0 - 1.05 * margin)
     assert slow.agrees
     assert not replace(slow, growth=1.0 - 1.2 * margin).agrees
 
@@ -161,10 +143,8 @@ def test_scan_tells_where_there_is_no_value() -> None:
 def test_lowest() -> None:
     assert find_minimum(lambda x: (x - 0.3) ** 2 - 1.0, 0.0, 1.0) == pytest.approx((0.3, -1.0), abs=1e-8)
     assert find_minimum(lambda x: x, 0.0, 1.0) == (0.0, 0.0)
-    with pytest.raises(InputError, match="must have a length"):
-        find_minimum(lambda x: x, 1.0, 0.0)
-    with pytest.raises(InputError, match="must have a length"):
-        scan(lambda x: x, 0.0, 1.0, samples=2)
+    refused(InputError, "must have a length", find_minimum, lambda x: x, 1.0, 0.0)
+    refused(InputError, "must have a length", scan, lambda x: x, 0.0, 1.0, samples=2)
 
 
 # Traces
@@ -239,14 +219,10 @@ def test_trace_stays_inside_the_box() -> None:
 
 
 def test_bad_traces_are_refused() -> None:
-    with pytest.raises(InputError, match="no boundary is within"):
-        trace(lambda x, y: x + 1.0, (0.5, 0.5), UNIT)
-    with pytest.raises(InputError, match="outside the box"):
-        trace(lambda x, y: x, (1.5, 0.5), UNIT)
-    with pytest.raises(InputError, match="must increase"):
-        Box(x=(1.0, 0.0), y=(0.0, 1.0))
-    with pytest.raises(InputError, match="lines"):
-        chart(lambda x, y: x, UNIT, lines=(0, 0))
+    refused(InputError, "no boundary is within", trace, lambda x, y: x + 1.0, (0.5, 0.5), UNIT)
+    refused(InputError, "outside the box", trace, lambda x, y: x, (1.5, 0.5), UNIT)
+    refused(InputError, "must increase", Box, x=(1.0, 0.0), y=(0.0, 1.0))
+    refused(InputError, "lines", chart, lambda x, y: x, UNIT, lines=(0, 0))
     short = trace(lambda x, y: y - 0.5, (0.5, 0.5), UNIT, most=3)
     assert [end.reason for end in short.ends] == [Reason.LENGTH] * 2
 
@@ -281,11 +257,11 @@ def test_mathieus_chart(multiplier: int) -> None:
     assert len(seen) == len(found.boundaries) == (3 if multiplier == 1 else 4)
 
 
-@pytest.mark.parametrize("inertia_ratio", FIRST_REGION)
+@pytest.mark.parametrize("inertia_ratio", published.FIRST_REGION)
 def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
     """The right numbers are about the true orbit; the linear equation about zeta = 0 is off in the fourth digit."""
-    right = FIRST_REGION[inertia_ratio]
-    test = orbit_test(first_region_plane(), -1)
+    right = published.FIRST_REGION[inertia_ratio]
+    test = periodic.orbit_test(first_region_plane(), -1)
     found = scan(lambda x: test(x, inertia_ratio), 0.25, 0.29, samples=60)
     assert found.roots == pytest.approx(right, abs=5e-7)
     linear = linear_test(first_region_plane(), -1)
@@ -293,19 +269,19 @@ def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
     assert about_zero == pytest.approx(right, abs=2.5e-4)
     assert np.abs(about_zero - right).max() > 1e-5
     # the thesis's is two and a half times as wide
-    wide, narrow = (high - low for low, high in (FIRST_REGION_THESIS[inertia_ratio], found.roots))
+    wide, narrow = (high - low for low, high in (published.FIRST_REGION_THESIS[inertia_ratio], found.roots))
     assert 2.4 < wide / narrow < 2.8
 
 
 def test_chart_of_the_true_orbit_round_a_tip() -> None:
     """With damping the boundary turns back at an I4; there that damping removes the region."""
-    found = chart(orbit_test(first_region_plane(0.1), -1), Box(x=(0.25, 0.29), y=(0.25, 2.0)), lines=(0, 2))
+    found = chart(periodic.orbit_test(first_region_plane(0.1), -1), Box(x=(0.25, 0.29), y=(0.25, 2.0)), lines=(0, 2))
     (boundary,) = found.boundaries
     assert [end.reason for end in boundary.ends] == [Reason.BOX] * 2
     assert boundary.residual < 1e-9
     tip = boundary.points[np.argmin(boundary.points[:, 1])]
-    removed = removing_damping(
-        lambda x, damping: orbit_test(first_region_plane(damping), -1)(x, float(tip[1])),
+    removed = periodic.removing_damping(
+        lambda x, damping: periodic.orbit_test(first_region_plane(damping), -1)(x, float(tip[1])),
         (0.25, 0.29),
         (0.0, 0.5),
         samples=10,
@@ -315,12 +291,12 @@ def test_chart_of_the_true_orbit_round_a_tip() -> None:
 
 
 def test_linear_verdicts() -> None:
-    inside, outside = (linear_verdict(chapter_4(1.0), Drive(speed=crank_speed(x))) for x in (0.2675, 0.2695))
-    damped = linear_verdict(chapter_4(1.0, 0.2), Drive(speed=crank_speed(0.2675)))
+    inside, outside = (linear_verdict(chapter_4(1.0), periodic.Drive(speed=crank_speed(x))) for x in (0.2675, 0.2695))
+    damped = linear_verdict(chapter_4(1.0, 0.2), periodic.Drive(speed=crank_speed(0.2675)))
     assert [v.stability for v in (inside, outside, damped)] == [
-        Stability.UNSTABLE,
-        Stability.MARGINAL,
-        Stability.STABLE,
+        periodic.Stability.UNSTABLE,
+        periodic.Stability.MARGINAL,
+        periodic.Stability.STABLE,
     ]
     assert damped.margin > 0.0 > inside.margin
 
@@ -329,7 +305,7 @@ def test_linear_verdicts() -> None:
 
 
 def test_removing_damping_is_where_hills_boundaries_meet() -> None:
-    found = removing_damping(lambda p, damping: mathieu(-1, damping)(p, 0.8), (0.0, 2.5), (0.0, 2.0))
+    found = periodic.removing_damping(lambda p, damping: mathieu(-1, damping)(p, 0.8), (0.0, 2.5), (0.0, 2.0))
     for factor, there in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
         equation = PeriodicEquation.mathieu(0.0, 0.8, damping=factor * found.damping)
         assert (1 in hill_regions(equation, 1)) is there
@@ -341,25 +317,25 @@ def test_removing_damping_of_the_first_region() -> None:
 
     def removing(inertia_ratio: float) -> float:
         def test(x: float, omega_c: float) -> float:
-            return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
+            return periodic.orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
 
-        return removing_damping(test, (0.26, 0.285), (0.0, 0.5), tolerance=1e-5).damping
+        return periodic.removing_damping(test, (0.26, 0.285), (0.0, 0.5), tolerance=1e-5).damping
 
     worst = removing(1.5)
-    assert worst == pytest.approx(REMOVING_DAMPING, abs=5e-4)
+    assert worst == pytest.approx(published.REMOVING_DAMPING, abs=5e-4)
     assert removing(1.1) < removing(1.3) < worst
-    assert REMOVING_DAMPING_READ_OFF / worst > 2.5
-    assert pytest.approx(REMOVING_DAMPING_THESIS, rel=0.03) == REMOVING_DAMPING_READ_OFF
+    assert published.REMOVING_DAMPING_READ_OFF / worst > 2.5
+    assert pytest.approx(published.REMOVING_DAMPING_THESIS, rel=0.03) == published.REMOVING_DAMPING_READ_OFF
 
 
 def test_damping_out_of_range_is_reported() -> None:
     def test(p: float, damping: float) -> float:
         return mathieu(-1, damping)(p, 0.8)
 
-    with pytest.raises(RemovalError, match=r"still there at the damping 0\.1"):
-        removing_damping(test, (0.0, 2.5), (0.0, 0.1), samples=10)
-    with pytest.raises(RemovalError, match="no region between 3 and 5"):
-        removing_damping(test, (3.0, 5.0), (0.0, 1.0), samples=10)
+    with pytest.raises(periodic.RemovalError, match=r"still there at the damping 0\.1"):
+        periodic.removing_damping(test, (0.0, 2.5), (0.0, 0.1), samples=10)
+    with pytest.raises(periodic.RemovalError, match="no region between 3 and 5"):
+        periodic.removing_damping(test, (3.0, 5.0), (0.0, 1.0), samples=10)
 
 
 # Grids
@@ -368,16 +344,16 @@ XS, YS = np.linspace(0.25, 0.29, 7), np.linspace(0.5, 1.5, 4)
 
 
 def test_grid_is_each_point_alone(tmp_path: Path) -> None:
-    found = grid(first_region_plane(0.05), XS, YS, folder=tmp_path)
+    found = periodic.grid(first_region_plane(0.05), XS, YS, folder=tmp_path)
     assert found.computed == len(YS)
     assert found.largest.shape == found.status.shape == (len(YS), len(XS))
     for row, y in enumerate(YS.tolist()):
         for column, x in enumerate(XS.tolist()):
-            orbit = newton_orbit(*first_region_plane(0.05)(x, y))
+            orbit = periodic.newton_orbit(*first_region_plane(0.05)(x, y))
             assert found.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)
             assert found.starts[row, column] == pytest.approx(orbit.start, abs=1e-9)
     states = found.stability()
-    assert {Stability.STABLE, Stability.UNSTABLE} == set(states.ravel())
+    assert {periodic.Stability.STABLE, periodic.Stability.UNSTABLE} == set(states.ravel())
 
 
 def test_a_grid_on_a_full_disk_is_computed_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -386,10 +362,10 @@ def test_a_grid_on_a_full_disk_is_computed_all_the_same(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(grids, "save_array", full)
     with pytest.warns(RuntimeWarning, match=r"rows of the grid are not kept: .*row cannot be written: No space"):
-        found = grid(first_region_plane(), XS, YS, folder=tmp_path)
+        found = periodic.grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert not list(tmp_path.iterdir())
     monkeypatch.undo()
-    assert np.array_equal(found.starts, grid(first_region_plane(), XS, YS, folder=tmp_path).starts)
+    assert np.array_equal(found.starts, periodic.grid(first_region_plane(), XS, YS, folder=tmp_path).starts)
 
 
 def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -404,23 +380,23 @@ def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.Mon
         return made
 
     monkeypatch.setattr(grids, "_compute_row", interrupted)
-    with pytest.raises(GridInterrupted, match="2 of 4 rows done") as caught:
-        grid(first_region_plane(), XS, YS, folder=tmp_path)
+    with pytest.raises(periodic.GridInterrupted, match="2 of 4 rows done") as caught:
+        periodic.grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert (caught.value.done, caught.value.rows) == (2, 4)
     monkeypatch.setattr(grids, "_compute_row", compute)
-    again = grid(first_region_plane(), XS, YS, folder=tmp_path)
+    again = periodic.grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert again.computed == 2
-    assert grid(first_region_plane(), XS, YS, folder=tmp_path).computed == 0
+    assert periodic.grid(first_region_plane(), XS, YS, folder=tmp_path).computed == 0
     # a row is the same whatever chart it belongs to
-    assert grid(first_region_plane(), XS, [*YS[1:], 2.0], folder=tmp_path).computed == 1
-    assert grid(first_region_plane(), XS, YS, folder=tmp_path, tolerance=1e-11).computed == 4
-    assert grid(first_region_plane(1e-3), XS, YS, folder=tmp_path).computed == 4
+    assert periodic.grid(first_region_plane(), XS, [*YS[1:], 2.0], folder=tmp_path).computed == 1
+    assert periodic.grid(first_region_plane(), XS, YS, folder=tmp_path, tolerance=1e-11).computed == 4
+    assert periodic.grid(first_region_plane(1e-3), XS, YS, folder=tmp_path).computed == 4
     for path in tmp_path.iterdir():
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 1  # in a multiplier, a start or a status
         path.write_bytes(content)
     with pytest.warns(RuntimeWarning, match="is damaged: what was in it is computed again"):
-        mended = grid(first_region_plane(), XS, YS, folder=tmp_path)
+        mended = periodic.grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert mended.computed == 4
     assert (mended.largest == again.largest).all()
 
@@ -428,7 +404,7 @@ def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.Mon
 @pytest.mark.parametrize("compiled", [True, False])
 def test_rows_of_other_code_are_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compiled: bool) -> None:
     def computed() -> int:
-        return grid(first_region_plane(), XS[:2], YS[:2], folder=tmp_path).computed
+        return periodic.grid(first_region_plane(), XS[:2], YS[:2], folder=tmp_path).computed
 
     assert (computed(), computed()) == (2, 0)
     if compiled:
@@ -443,8 +419,8 @@ def test_rows_of_other_code_are_not_taken(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> None:
     """A crank longer than coupler and rocker together cannot turn wherever the slider is."""
-    operation = plane(TABLE_3_1, Drive(speed=14.0 * pi), "crank.length", "slider.damping")
-    found = grid(operation, [0.05, 0.04, 0.5], [30.0], folder=tmp_path)
+    operation = periodic.plane(TABLE_3_1, periodic.Drive(speed=14.0 * pi), "crank.length", "slider.damping")
+    found = periodic.grid(operation, [0.05, 0.04, 0.5], [30.0], folder=tmp_path)
     assert found.largest.mask.tolist() == [[False, False, True]]
     assert found.reason(0, 0) == ""
     assert found.reason(0, 2) in orbit_kernels.REASONS.values()
@@ -453,14 +429,10 @@ def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> Non
 
 
 def test_bad_grids_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cores"):
-        grid(first_region_plane(), XS, YS, n_jobs=0)
-    with pytest.raises(InputError, match="axis y"):
-        grid(first_region_plane(), XS, [], folder=tmp_path)
-    with pytest.raises(InputError, match="axis x"):
-        grid(first_region_plane(), [np.nan], YS, folder=tmp_path)
-    with pytest.raises(ParameterError, match=r"rocker\.inertia"):
-        grid(first_region_plane(), XS, [-1.0], folder=tmp_path)
+    refused(InputError, "cores", periodic.grid, first_region_plane(), XS, YS, n_jobs=0)
+    refused(InputError, "axis y", periodic.grid, first_region_plane(), XS, [], folder=tmp_path)
+    refused(InputError, "axis x", periodic.grid, first_region_plane(), [np.nan], YS, folder=tmp_path)
+    refused(ParameterError, r"rocker\.inertia", periodic.grid, first_region_plane(), XS, [-1.0], folder=tmp_path)
 
 
 # Long runs
@@ -468,40 +440,40 @@ def test_bad_grids_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("lambda_k2", "expected"), LONG_RUNS)
 def test_long_runs_without_damping(lambda_k2: float, expected: str) -> None:
-    low, high = FIRST_REGION_THESIS[1.0]
+    low, high = published.FIRST_REGION_THESIS[1.0]
     assert (low < lambda_k2 < high) or lambda_k2 == 0.2655
-    outcome = Outcome.GROWS if expected == "grows" else Outcome.BOUNDED
-    run = confirm(chapter_4(1.0), Drive(speed=crank_speed(lambda_k2)), turns=2000)
+    outcome = periodic.Outcome.GROWS if expected == "grows" else periodic.Outcome.BOUNDED
+    run = periodic.confirm(chapter_4(1.0), periodic.Drive(speed=crank_speed(lambda_k2)), turns=2000)
     assert run.outcome is outcome
     assert run.agrees
     assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-7)
     assert run.message == ""
-    if outcome is Outcome.BOUNDED:
-        assert run.verdict.stability is Stability.MARGINAL
+    if outcome is periodic.Outcome.BOUNDED:
+        assert run.verdict.stability is periodic.Stability.MARGINAL
         assert run.deviations.max() < 1.1
     else:
         assert run.deviations.max() > 1e4
 
 
 def test_long_run_decays_at_the_multiplier_of_a_complex_pair() -> None:
-    run = confirm(chapter_4(1.0, 0.5), Drive(speed=crank_speed(0.3)), turns=300)
+    run = periodic.confirm(chapter_4(1.0, 0.5), periodic.Drive(speed=crank_speed(0.3)), turns=300)
     assert abs(run.verdict.largest_multiplier.imag) > 0.1
-    assert run.outcome is Outcome.DECAYS
+    assert run.outcome is periodic.Outcome.DECAYS
     assert run.agrees
     assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-5)
 
 
 def test_a_deviation_that_is_lost_within_a_turn_has_decayed() -> None:
-    run = confirm(replace(TABLE_3_1, slider_damping=200.0), Drive(speed=2.0))
+    run = periodic.confirm(replace(TABLE_3_1, slider_damping=200.0), periodic.Drive(speed=2.0))
     assert abs(run.verdict.largest_multiplier) < 1e-3
-    assert run.outcome is Outcome.DECAYS
+    assert run.outcome is periodic.Outcome.DECAYS
     assert run.agrees
     assert run.growth < 2e-3
 
 
 def test_bad_long_runs_are_refused() -> None:
     with pytest.raises(InputError, match="at least 20 turns"):
-        confirm(chapter_4(1.0), Drive(speed=60.0), turns=19)
+        periodic.confirm(chapter_4(1.0), periodic.Drive(speed=60.0), turns=19)
 
 
 # Pictures

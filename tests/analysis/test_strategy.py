@@ -49,11 +49,8 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
     """Two harmonics were used to trace it: four-bar, one harmonic, two, and there it stops."""
     series = FourierSeries(np.array([0.0, 0.012, 0.008]), np.array([0.0, 0.010, -0.009]))
     found = strategy(replace(BASE, pivot=syn.SliderMotion(series, 0.4)), 0.01 * MM2, bounds=links_of(BASE))
-    assert [step.mechanism for step in found.steps] == [
-        "four-bar",
-        "four-bar with a moved slider, 1 harmonic",
-        "four-bar with a moved slider, 2 harmonics",
-    ]
+    sliding = ("four-bar with a moved slider, 1 harmonic", "four-bar with a moved slider, 2 harmonics")
+    assert [step.mechanism for step in found.steps] == ["four-bar", *sliding]
     values = [step.value for step in found.steps]
     assert values[0] > values[1] > values[2]
     assert found.met
@@ -61,9 +58,8 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
     linkage = found.chosen.solution.linkage
     assert isinstance(linkage.pivot, syn.SliderMotion)
     moved = np.array(linkage.displacement(PHI))
-    assert moved == pytest.approx(
-        np.array(replace(linkage, pivot=syn.SliderMotion(series, 0.4)).displacement(PHI)), abs=1e-6
-    )
+    right = replace(linkage, pivot=syn.SliderMotion(series, 0.4)).displacement(PHI)
+    assert moved == pytest.approx(np.array(right), abs=1e-6)
     for step in found.steps[:-1]:
         ratio = step.value / (0.01 * MM2)
         assert f"is {ratio:.3g} times the tolerance 0.01 mm2: rejected" in step.reason
@@ -91,10 +87,8 @@ def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
     psi = FourierSeries(np.array([0.0, 0.5]), np.array([0.0, -0.4]))
     arm = syn.SecondCrank(length=0.03, ratio=2, phase=0.9, series=psi)
     found = strategy(BASE.with_pivot(arm), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE))
-    assert [step.mechanism for step in found.steps][-2:] == [
-        "five-bar, second crank geared 2:1",
-        "five-bar, second crank turned independently, 1 harmonic",
-    ]
+    cranks = ["five-bar, second crank geared 2:1", "five-bar, second crank turned independently, 1 harmonic"]
+    assert [step.mechanism for step in found.steps][-2:] == cranks
     assert found.met
     # it goes on from the better of the gears
     assert found.chosen.solution.linkage.pivot.ratio == 2
@@ -110,14 +104,8 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     s = np.linspace(0.0, 4.0, 24, endpoint=False)
     square = np.column_stack([np.interp(s, range(5), corners[:, k]) for k in (0, 1)])
     limits = (syn.LeastTransmission(), syn.LargestLink(length=0.4))
-    found = simplest_mechanism(
-        syn.TimedPath(points=square),
-        1e-3 * MM2,
-        constraints=limits,
-        harmonics=1,
-        ratios=(-1,),
-        search=syn.Search(starts=3),
-    )
+    options = {"harmonics": 1, "ratios": (-1,), "search": syn.Search(starts=3)}
+    found = simplest_mechanism(syn.TimedPath(points=square), 1e-3 * MM2, constraints=limits, **options)
     assert not found.met
     assert len(found.steps) == 4
     assert all(step.reason.endswith("rejected") for step in found.steps)
@@ -127,37 +115,23 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     for step in found.steps:
         assert step.solution.linkage.largest_link <= 0.4 * (1.0 + 1e-6)
         assert step.solution.linkage.least_transmission > radians(39.5)
-        assert step.solution.error == pytest.approx(
-            syn.evaluate(syn.TimedPath(points=square), step.solution.linkage).error
-        )
+        error = syn.evaluate(syn.TimedPath(points=square), step.solution.linkage).error
+        assert step.solution.error == pytest.approx(error)
     assert str(found).splitlines() == [f"{step.mechanism}: {step.reason}" for step in found.steps]
 
 
 def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
     weighted = PROBLEMS["rocker-weighted"]
     task = replace(weighted.task, weights=None)
-    found = simplest_mechanism(
-        task,
-        radians(14.0),
-        criterion="worst",
-        bounds=links_of(weighted.linkage),
-        constraints=(syn.FullTurn(),),
-        search=syn.Search(starts=8),
-    )
+    options = {"bounds": links_of(weighted.linkage), "constraints": (syn.FullTurn(),)}
+    found = simplest_mechanism(task, radians(14.0), criterion="worst", **options, search=syn.Search(starts=8))
     assert found.criterion == "worst"
     assert found.met
     assert len(found.steps) == 2
     for step in found.steps:
         assert step.value == step.solution.evaluation.worst
         assert f"worst {degrees(step.value):.4g} deg" in step.reason
-    error = simplest_mechanism(
-        task,
-        1.0,
-        criterion="error",
-        bounds=links_of(weighted.linkage),
-        constraints=(syn.FullTurn(),),
-        search=syn.Search(starts=2),
-    )
+    error = simplest_mechanism(task, 1.0, criterion="error", **options, search=syn.Search(starts=2))
     assert len(error.steps) == 1
     assert f"is within {degrees(degrees(1.0)):.4g} deg2: accepted" in str(error)
 
@@ -178,9 +152,8 @@ def test_without_a_solution_a_step_has_none() -> None:
     """A second crank of at least a thousandth of the stroke, 1 m, cannot be joined to these links."""
     series = FourierSeries(np.array([0.0, 0.02, 0.01, 0.01]), np.zeros(4))
     traced = replace(BASE, pivot=syn.SliderMotion(series, 0.4))
-    found = strategy(
-        traced, 1e-6 * MM2, bounds=links_of(BASE), harmonics=1, ratios=(1, 2), stroke=1000.0, second_crank=2.0
-    )
+    second = {"ratios": (1, 2), "stroke": 1000.0, "second_crank": 2.0}
+    found = strategy(traced, 1e-6 * MM2, bounds=links_of(BASE), harmonics=1, **second)
     assert [step.solution is None for step in found.steps] == [False, False, True, True, True]
     for step in found.steps[2:]:
         assert step.value == inf

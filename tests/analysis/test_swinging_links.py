@@ -13,37 +13,18 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from analysis import periodic
 from analysis.figures import plot
 from analysis.linear import find_equilibria, find_equilibrium, linearise_orbit
 from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
-from analysis.periodic import (
-    TRUE_ORBIT,
-    Crossing,
-    Drive,
-    Stability,
-    basins,
-    confirm_form,
-    describe_end,
-    describe_turns,
-    find_orbit,
-    find_orbits,
-    frequency_response,
-    join_orbits,
-    newton_orbit,
-    normal_form,
-    special_gradient,
-    stability_chart,
-    sweep,
-    unsought_hint,
-    with_isolas,
-)
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.run import Inputs, load_case, load_parameters
 from analysis.tuning import Wish, load_tuning_case, tune
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import PublishedSet
+from tests.refusals import refused
 
 coexistences = import_module("analysis.periodic.chart.coexistence")
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -82,17 +63,17 @@ def mathieu(speed: float, *, stiffness: float = 0.0, damping: float = DAMPING, u
 def test_a_motion_is_sought_from_where_the_linkage_starts(hanging: float) -> None:
     parameters = yoke(f"yoke-{abs(hanging):.0f}", hanging=hanging).parameters
     for speed in (100.0 * RAD_S_PER_RPM, 134.0 * RAD_S_PER_RPM):
-        orbit = newton_orbit(parameters, Drive(speed=speed))
+        orbit = periodic.newton_orbit(parameters, periodic.Drive(speed=speed))
         np.testing.assert_allclose(np.sort_complex(orbit.multipliers), mathieu(speed), rtol=1e-7)
         assert orbit.amplitude == 0.0
-        np.testing.assert_allclose(find_orbit(parameters, speed=speed).start, [hanging, 0.0], atol=1e-9)
+        np.testing.assert_allclose(periodic.find_orbit(parameters, speed=speed).start, [hanging, 0.0], atol=1e-9)
 
 
 def test_a_chart_has_the_tongue_in_which_the_pendulum_swings_at_the_speed_of_the_crank() -> None:
     parameters, names = yoke("yoke-tongue").parameters, ("drive.speed", "hinge.damping")
-    chart = stability_chart(parameters, Drive(speed=6.8), names, ((6.6, 7.2), (0.0, 1e-4)), points=3)
-    own = [traced for traced in chart.boundaries if traced.motion == TRUE_ORBIT]
-    assert [traced.kind for traced in own] == 2 * [Crossing.BRANCH_POINT]
+    chart = periodic.stability_chart(parameters, periodic.Drive(speed=6.8), names, ((6.6, 7.2), (0.0, 1e-4)), points=3)
+    own = [traced for traced in chart.boundaries if traced.motion == periodic.TRUE_ORBIT]
+    assert [traced.kind for traced in own] == 2 * [periodic.Crossing.BRANCH_POINT]
     for traced in own:
         for speed, damping in traced.points[::10].tolist():
             assert abs(mathieu(speed, damping=damping) - 1.0).min() < 1e-5
@@ -101,14 +82,14 @@ def test_a_chart_has_the_tongue_in_which_the_pendulum_swings_at_the_speed_of_the
 
 def test_a_run_confirms_no_normal_form_where_the_motion_is_stable_again_nearby() -> None:
     narrow = replace(yoke("yoke-narrow").parameters, hinge_damping=1e-4)
-    response = frequency_response(narrow, 6.9, 7.0, doublings=0)
+    response = periodic.frequency_response(narrow, 6.9, 7.0, doublings=0)
     point = response.branches[0].special[0]
     with pytest.raises(LinkworkError, match="too narrow"):
-        confirm_form(response.family, point, normal_form(response.family, point))
+        periodic.confirm_form(response.family, point, periodic.normal_form(response.family, point))
 
 
 def test_from_a_start_that_goes_round_no_rotation_is_added_to_coexisting_motions() -> None:
-    point = operating_point(yoke("yoke-added").parameters, Drive(speed=20.0))
+    point = operating_point(yoke("yoke-added").parameters, periodic.Drive(speed=20.0))
     into = np.full((coexistences.MOST_ORBITS, 5), np.nan)
     assert coexistences._add_motions(point, np.array([[-0.91119805, 21.98298217]]), into, 1)
     np.testing.assert_allclose(into[0, 3:], 0.0, atol=1e-9)  # it hangs
@@ -116,19 +97,19 @@ def test_from_a_start_that_goes_round_no_rotation_is_added_to_coexisting_motions
 
 def test_an_amplitude_of_zero_has_no_elasticities() -> None:
     still = replace(yoke("yoke-still").parameters, hinge_damping=1e-3)
-    response = frequency_response(still, "120 rpm", "130 rpm", doublings=0)
+    response = periodic.frequency_response(still, "120 rpm", "130 rpm", doublings=0)
     (doubling,) = response.branches[0].special
-    assert special_gradient(response.family, doubling).amplitude.value == 0.0
+    assert periodic.special_gradient(response.family, doubling).amplitude.value == 0.0
 
 
 def test_what_hangs_and_what_stands_are_two_motions_however_often_the_pin_has_turned() -> None:
     parameters, speed = yoke("yoke-free", hanging=-pi).parameters, 100.0 * RAD_S_PER_RPM
-    found = find_orbits(parameters, speed=speed)
+    found = periodic.find_orbits(parameters, speed=speed)
     assert sorted(orbit.start[0] for orbit in found.orbits) == pytest.approx([-pi, 0.0], abs=1e-9)
     (hangs,) = found.stable
     (stands,) = (orbit for orbit in found.orbits if orbit is not hangs)
     np.testing.assert_allclose(np.sort_complex(stands.multipliers), mathieu(speed, upright=True), rtol=1e-7)
-    settled = basins(parameters, Drive(speed=speed), points=8)
+    settled = periodic.basins(parameters, periodic.Drive(speed=speed), points=8)
     assert settled.share(0) > 0.9  # it comes to hang, from many starts after whole turns
     angles = [found.coordinates[1] for found in find_equilibria(parameters)]
     assert sorted(abs(angle) for angle in angles) == pytest.approx([0.0, pi], abs=1e-9)
@@ -150,9 +131,9 @@ def test_basins_are_in_the_plane_that_the_motions_span() -> None:
     built.spring("hinge", at="P", damping=0.008)
     built.freedom("crank", "A", speed="112 rpm").freedom("lift", "Y").freedom("swing", "P", start=-pi)
     built.mechanism()
-    parameters, drive = PUBLISHED["absorber"].parameters, Drive(speed="112 rpm")
-    found = join_orbits([find_orbits(parameters, speed="112 rpm", turns=turns) for turns in (1, 2)])
-    swings = basins(parameters, drive, points=6, found=found)
+    parameters, drive = PUBLISHED["absorber"].parameters, periodic.Drive(speed="112 rpm")
+    found = periodic.join_orbits([periodic.find_orbits(parameters, speed="112 rpm", turns=turns) for turns in (1, 2)])
+    swings = periodic.basins(parameters, drive, points=6, found=found)
     assert swings.labels == ("swing.angle [rad]", "swing.speed [rad/s]")
     assert swings.fixed == ("lift.position", "lift.velocity")
     assert min(swings.share(0), swings.share(1)) > 0.1
@@ -161,11 +142,11 @@ def test_basins_are_in_the_plane_that_the_motions_span() -> None:
     rates = max(np.abs(orbit.turn()["swing.speed"]).max() for orbit in found.orbits)
     assert swings.rate[[0, -1]] == pytest.approx([-1.5 * rates, 1.5 * rates], rel=1e-2)
     # from a pendulum at rest the lift alone does not reach the motion in which it swings
-    lifts = basins(parameters, drive, points=6, found=found, coordinate="lift.position")
+    lifts = periodic.basins(parameters, drive, points=6, found=found, coordinate="lift.position")
     assert (lifts.ends == 0).all()
     size = max(np.ptp(orbit.turn()["lift.position"]) for orbit in found.orbits)
     assert size < np.ptp(lifts.position) < 2.0 * size
-    same = basins(parameters, drive, points=2, found=found, position=("-10 mm", "10 mm"))
+    same = periodic.basins(parameters, drive, points=2, found=found, position=("-10 mm", "10 mm"))
     assert same.labels[0] == "lift.position [m]"
     axis = plot(swings).axes[0]
     assert axis.get_xlabel() == "swing angle at crank angle 0, all else as in motion 1 [deg]"
@@ -174,15 +155,17 @@ def test_basins_are_in_the_plane_that_the_motions_span() -> None:
     for marks in axis.lines[:2]:
         assert all(low - 1e-9 <= x <= high + 1e-9 for x in np.asarray(marks.get_xdata()))
     with pytest.raises(InputError, match=r"free coordinate 'swing\.speed'"):
-        basins(parameters, drive, points=2, found=found, coordinate="swing.speed")
+        periodic.basins(parameters, drive, points=2, found=found, coordinate="swing.speed")
 
 
 def test_a_branch_is_the_same_after_whole_turns() -> None:
     hanging = yoke("yoke-of-a-response").parameters
-    response = frequency_response(hanging, "100 rpm", "101 rpm", start=[2.0 * pi, 0.0], greatest_step=0.2, doublings=0)
+    response = periodic.frequency_response(
+        hanging, "100 rpm", "101 rpm", start=[2.0 * pi, 0.0], greatest_step=0.2, doublings=0
+    )
     (branch,) = response.branches
     assert branch.orbits[0].start[0] == pytest.approx(2.0 * pi)
-    assert len(with_isolas(response, places=1, greatest_step=0.2).branches) == 2  # and that on which it stands
+    assert len(periodic.with_isolas(response, places=1, greatest_step=0.2).branches) == 2  # and that on which it stands
 
 
 @pytest.mark.slow
@@ -190,7 +173,7 @@ def test_where_the_amplitude_is_rounding_it_has_no_extremum_and_a_damping_is_fou
     """Parametric excitation: the pendulum hangs still until twice its natural frequency is near the crank's."""
     sprung = yoke("yoke-sprung", stiffness=1.0).parameters
     low, high = 190.0 * RAD_S_PER_RPM, 215.0 * RAD_S_PER_RPM
-    response = frequency_response(sprung, low, high, doublings=0)
+    response = periodic.frequency_response(sprung, low, high, doublings=0)
     assert response.maxima() == response.minima() == ()
     name = "hinge.damping"
     wish = Wish(parameters=sprung, speeds=(low, high), change={name: (0.002, 0.2)}, no_unstable=True, least=name)
@@ -231,22 +214,17 @@ def test_a_case_has_what_stands_in_the_file_of_its_linkage(tmp_path: Path) -> No
     assert (found.title, found.stop_time, found.step) == ("case", 0.3, 1e-3)
     assert (found.parameters.hinge_stiffness, found.parameters.hinge_damping) == (3.0, 0.5)
     case.write_text('linkage = "rod.toml"\npublished = "table-3.1"\n')
-    with pytest.raises(InputError, match=r"one mechanism: leave out linkage, or published = 'table-3.1'"):
-        load_case(case)
+    refused(InputError, r"one mechanism: leave out linkage, or published = 'table-3.1'", load_case, case)
     case.write_text('linkage = "case.toml"\n')
     for load in (load_case, load_linkage):
-        with pytest.raises(InputError, match="names itself as the file of its linkage"):
-            load(case)
+        refused(InputError, "names itself as the file of its linkage", load, case)
     case.write_text("linkage = 7\n")
-    with pytest.raises(ParameterError, match="linkage is 7: it must be the name of a file"):
-        load_case(case)
+    refused(ParameterError, "linkage is 7: it must be the name of a file", load_case, case)
     case.write_text('mechanism = "not-loaded"\n')
-    with pytest.raises(InputError, match="a linkage of your own is loaded first"):
-        load_parameters(case)
+    refused(InputError, "a linkage of your own is loaded first", load_parameters, case)
     (tmp_path / "chain.toml").write_text("[run]\n")
     case.write_text('linkage = "chain.toml"\n')
-    with pytest.raises(InputError, match="describes no linkage"):
-        load_case(case)
+    refused(InputError, "describes no linkage", load_case, case)
 
 
 def test_the_file_of_a_linkage_is_found_from_where_the_tuned_case_is_written(tmp_path: Path) -> None:
@@ -275,21 +253,18 @@ def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
     # till it has settled
     period = 2.0 * pi / speed
     hangs = solve_ivp(rates, (0.0, 300.0 * period), [-0.5 * pi, 0.0], rtol=1e-10, atol=1e-12, method="DOP853").y[:, -1]
-    orbit = find_orbit("hanging-arm", speed=speed)
+    orbit = periodic.find_orbit("hanging-arm", speed=speed)
     assert orbit.rounds == {"swing.angle": -1}
     np.testing.assert_allclose(orbit.start, hangs - [0.0, speed], atol=1e-8)
-    assert basins("hanging-arm", Drive(speed=speed), points=4).share(0) > 0.0
+    assert periodic.basins("hanging-arm", periodic.Drive(speed=speed), points=4).share(0) > 0.0
     # it is the stable one of two where the hinge has hardly any damping, too
     slack = replace(PUBLISHED["hanging-arm"].parameters, hinge_damping=2e-5)
-    assert find_orbit(slack, speed="200 rpm").verdict().stability is Stability.STABLE
-    found = find_orbits("hanging-arm", speed=speed)
+    assert periodic.find_orbit(slack, speed="200 rpm").verdict().stability is periodic.Stability.STABLE
+    found = periodic.find_orbits("hanging-arm", speed=speed)
     assert (found.agreed, found.index) == (True, 0)  # the arm that stands on the pin is among them
     # a motion of three turns in which the arm goes round once is one motion, whichever turn comes first
-    thirds = [
-        orbit
-        for orbit in find_orbits("hanging-arm", speed=speed, turns=3).orbits
-        if abs(orbit.rounds["swing.angle"]) == 1
-    ]
+    orbits = periodic.find_orbits("hanging-arm", speed=speed, turns=3).orbits
+    thirds = [orbit for orbit in orbits if abs(orbit.rounds["swing.angle"]) == 1]
     starts = [orbit.passages() for orbit in thirds]
     assert [len(passed) for passed in starts] == [3] * len(thirds)
     flow, everything = orbit.flow, np.vstack(starts)
@@ -298,8 +273,8 @@ def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
 
 
 def test_what_is_not_sought_of_links_that_go_round_is_said() -> None:
-    assert "swing.angle" in unsought_hint(yoke("yoke-unsought").parameters, Drive(speed=10.0))
-    assert unsought_hint(PUBLISHED["table-3.1"].parameters, Drive(speed=10.0)) == ""
+    assert "swing.angle" in periodic.unsought_hint(yoke("yoke-unsought").parameters, periodic.Drive(speed=10.0))
+    assert periodic.unsought_hint(PUBLISHED["table-3.1"].parameters, periodic.Drive(speed=10.0)) == ""
 
 
 def test_turns_in_a_period_are_those_of_the_crank() -> None:
@@ -312,25 +287,23 @@ def test_turns_in_a_period_are_those_of_the_crank() -> None:
     built.spring("hinge", at="F", stiffness=4.0, damping=0.02)
     built.freedom("one", "A", speed="300 rpm").freedom("bob", "F")
     built.mechanism()
-    orbit = find_orbit("two-wheels", speed="300 rpm")
+    orbit = periodic.find_orbit("two-wheels", speed="300 rpm")
     assert orbit.turn().period == pytest.approx(0.4)
     assert "2 turns at" in repr(orbit)
-    response = frequency_response("two-wheels", "300 rpm", "302 rpm", doublings=0)
+    response = periodic.frequency_response("two-wheels", "300 rpm", "302 rpm", doublings=0)
     assert (response.branches[0].columns()["turns in a period [1]"] == 2.0).all()
-    (speeds,) = (
-        v for name, v in response.branches[0].columns().items() if name.startswith("mean ") and "[rad/s]" in name
-    )
+    columns = response.branches[0].columns()
+    (speeds,) = (v for name, v in columns.items() if name.startswith("mean ") and "[rad/s]" in name)
     assert speeds == pytest.approx(response.branches[0].parameter)
-    assert (sweep("two-wheels", "300 rpm").turns == 2).all()
+    assert (periodic.sweep("two-wheels", "300 rpm").turns == 2).all()
     # order 1 is once in each turn of the crank, as the second of the common period
     turn = orbit.turn()
     twice = 2.0 * abs(np.fft.rfft(turn["bob.angle"])[1:3]) / len(turn.angle)
     assert [turn.harmonic("bob.angle", order) for order in (0.5, 1)] == pytest.approx(twice)
     part = replace(response.branches[0], reason="it ends")
-    assert describe_end(replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))).startswith(
-        "the branch with a period of 4 turns"
-    )
-    assert describe_turns(orbit.flow, 1) == "2 turns"
+    doubled = replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))
+    assert periodic.describe_end(doubled).startswith("the branch with a period of 4 turns")
+    assert periodic.describe_turns(orbit.flow, 1) == "2 turns"
 
 
 def going_round(speed: float, start: Any, damping: float = DAMPING) -> Any:
@@ -344,9 +317,8 @@ def going_round(speed: float, start: Any, damping: float = DAMPING) -> Any:
 
     found, rounds = np.array(start), np.sign(start[1])
     for _ in range(8):
-        over = solve_ivp(
-            rates, (0.0, 2.0 * pi / speed), [*found, 1.0, 0.0, 0.0, 1.0], rtol=1e-12, atol=1e-13, method="DOP853"
-        )
+        tight = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+        over = solve_ivp(rates, (0.0, 2.0 * pi / speed), [*found, 1.0, 0.0, 0.0, 1.0], **tight)
         end = over.y[:, -1]
         matrix = end[2:].reshape(2, 2)
         found = found + np.linalg.solve(np.eye(2) - matrix, end[:2] - [2.0 * pi * rounds, 0.0] - found)
@@ -355,7 +327,7 @@ def going_round(speed: float, start: Any, damping: float = DAMPING) -> Any:
 
 def test_a_pendulum_that_goes_round_with_the_crank_is_found() -> None:
     parameters, speed = yoke("yoke-round").parameters, 300.0 * RAD_S_PER_RPM
-    found = find_orbits(parameters, speed=speed)
+    found = periodic.find_orbits(parameters, speed=speed)
     assert (found.agreed, found.index, found.index_of_all) == (True, 0, 0)
     round_it = [orbit for orbit in found.orbits if orbit.rounds]
     # to both sides a stable and an unstable one, mirror images
@@ -380,18 +352,20 @@ def test_damping_ends_what_goes_round_where_the_mean_torque_says() -> None:
     most = 0.5 * MASS * ARM * STROKE * speed
     for share, count in ((0.97, 4), (1.03, 0)):
         damped = replace(parameters, hinge_damping=share * most)
-        assert len([orbit for orbit in find_orbits(damped, speed=speed).orbits if orbit.rounds]) == count
+        assert len([orbit for orbit in periodic.find_orbits(damped, speed=speed).orbits if orbit.rounds]) == count
 
 
 def test_a_machine_that_starts_to_go_round_goes_on() -> None:
     parameters, speed = yoke("yoke-started").parameters, 300.0 * RAD_S_PER_RPM
-    round_it = max(find_orbits(parameters, speed=speed).stable, key=lambda orbit: orbit.start[1])
+    round_it = max(periodic.find_orbits(parameters, speed=speed).stable, key=lambda orbit: orbit.start[1])
     near = round_it.start + np.array([0.05, 0.5])
-    assert newton_orbit(parameters, Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
-    swept = sweep(parameters, np.linspace(300.0, 400.0, 5) * RAD_S_PER_RPM, start=near)
+    assert periodic.newton_orbit(parameters, periodic.Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
+    swept = periodic.sweep(parameters, np.linspace(300.0, 400.0, 5) * RAD_S_PER_RPM, start=near)
     assert [orbit and orbit.rounds for orbit in swept.orbits] == [{"swing.angle": 1}] * 5
-    assert find_orbit(parameters, speed=speed).rounds == {}  # run up from rest it hangs
-    settled = basins(parameters, Drive(speed=speed), points=12, rate=(-40.0, 40.0), position=(-3.0, 3.0))
+    assert periodic.find_orbit(parameters, speed=speed).rounds == {}  # run up from rest it hangs
+    settled = periodic.basins(
+        parameters, periodic.Drive(speed=speed), points=12, rate=(-40.0, 40.0), position=(-3.0, 3.0)
+    )
     shares = {orbit.rounds.get("swing.angle", 0): settled.share(n) for n, orbit in enumerate(settled.motions)}
     assert set(shares) == {-1, 0, 1}
     assert min(shares.values()) > 0.02
@@ -400,7 +374,7 @@ def test_a_machine_that_starts_to_go_round_goes_on() -> None:
 
 def test_a_response_has_the_branch_that_goes_round() -> None:
     parameters = yoke("yoke-response").parameters
-    response = with_isolas(frequency_response(parameters, "280 rpm", "320 rpm"), places=1)
+    response = periodic.with_isolas(periodic.frequency_response(parameters, "280 rpm", "320 rpm"), places=1)
     rounds = sorted(branch.orbits[0].rounds.get("swing.angle", 0) for branch in response.branches)
     assert {-1, 0, 1} <= set(rounds)
     for branch in response.branches:
@@ -411,7 +385,7 @@ def test_a_response_has_the_branch_that_goes_round() -> None:
 
 def test_a_sweep_leaves_what_hangs_still_where_that_is_unstable() -> None:
     parameters, speed = yoke("yoke-swept").parameters, 134.0 * RAD_S_PER_RPM
-    *_, last = sweep(parameters, np.linspace(110.0, 134.0, 9) * RAD_S_PER_RPM).orbits
+    *_, last = periodic.sweep(parameters, np.linspace(110.0, 134.0, 9) * RAD_S_PER_RPM).orbits
     inertia, period = INERTIA + MASS * ARM**2, 2.0 * pi / speed
 
     def rates(t: float, x: Any) -> Any:
@@ -429,6 +403,6 @@ def test_a_sweep_leaves_what_hangs_still_where_that_is_unstable() -> None:
 def test_an_undamped_crank_is_not_run_up_to_settle() -> None:
     """Which took minutes, since nothing dies out."""
     made = load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / "two-crank-five-bar.toml")
-    orbit = find_orbit(made.first_set.parameters, Inputs(left_speed="120 rpm", right_torque=0.0))
-    assert orbit.verdict().stability is Stability.MARGINAL
+    orbit = periodic.find_orbit(made.first_set.parameters, Inputs(left_speed="120 rpm", right_torque=0.0))
+    assert orbit.verdict().stability is periodic.Stability.MARGINAL
     assert orbit.others == 5

@@ -45,11 +45,9 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     flags = (0.0,) * len(mechanism.modes)
     state = casadi.SX.sym("x", len(x))
     ours = symbolic_equations(mechanism)
-    of_state = casadi.vertcat(
-        *ours.find(mechanism.equations.derivative)(
-            tuple(casadi.vertsplit(state)), mechanism.equations.apply_inputs(flags, tuple(u), p), p
-        )
-    )
+    applied = mechanism.equations.apply_inputs(flags, tuple(u), p)
+    derivative = ours.find(mechanism.equations.derivative)
+    of_state = casadi.vertcat(*derivative(tuple(casadi.vertsplit(state)), applied, p))
     exact = np.array(casadi.Function("jacobian", [state], [casadi.densify(casadi.jacobian(of_state, state))])(x))
     derivative = rebind_functions(mechanism.modules, COMPLEX).find(mechanism.equations.derivative)
     stepped = np.empty((len(x), len(x)))

@@ -21,7 +21,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis.result import report
 from analysis.synthesis.result.output import rounded_hull
 from linkwork.errors import AssemblyError, InputError, ParameterError
-from tests.linkages import ellipse
+from tests.linkages import ellipse, outline
 
 PHI = syn.turn(24)
 ELLIPSE = ellipse(24)
@@ -45,14 +45,13 @@ def timed(linkage: syn.Linkage = LINKAGE) -> syn.Solution:
 
 def untimed(closed: bool = True) -> syn.Solution:
     points = ELLIPSE if closed else ELLIPSE[:9]
-    task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=closed))
+    task = outline(points, closed=closed)
     return syn.Solution.from_linkage(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
 
 
 def rocker() -> syn.Solution:
-    return syn.Solution.from_linkage(
-        syn.RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0)
-    )
+    task = syn.RockerFunction(angle=2.0 + 0.4 * np.sin(PHI))
+    return syn.Solution.from_linkage(task, replace(LINKAGE, point_distance=0.0))
 
 
 def axis_of(figure, label):
@@ -168,9 +167,8 @@ def test_the_guide_spans_the_travel_of_the_slider() -> None:
 def test_the_block_is_drawn_as_a_rectangle_along_its_guide() -> None:
     tilted = replace(SLIDING, pivot=replace(SLIDING.pivot, guide_angle=0.5))
     drawn = syn.drawing(timed(tilted), 1.0)
-    (line,), (block,) = (
-        [x for x in shapes if x.layer in ("guide", "slider")] for shapes in (drawn.lines, drawn.polylines)
-    )
+    (line,) = (one for one in drawn.lines if one.layer == "guide")
+    (block,) = (one for one in drawn.polylines if one.layer == "slider")
     guide = np.subtract(line.end, line.start)
     sides = np.roll(block.points, -1, axis=0) - block.points
     assert [abs(sides[k] @ sides[k - 1]) for k in range(4)] == pytest.approx([0.0] * 4, abs=1e-12)
@@ -289,9 +287,7 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
     # what is written can be read back: the curve from SVG, links from DXF in mm
     curve, closed = read_points(save_drawing(tmp_path / "a.svg", sheet), name="coupler-curve")
     assert closed
-    np.testing.assert_allclose(
-        curve, LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, len(curve), endpoint=False)), atol=1e-9
-    )
+    np.testing.assert_allclose(curve, LINKAGE.path(syn.turn(len(curve))), atol=1e-9)
     document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", sheet))
     crank = next(e for e in document.modelspace() if e.dxf.layer == "crank" and e.dxftype() == "LINE")
     assert (crank.dxf.end - crank.dxf.start).magnitude == pytest.approx(50.0)
@@ -310,10 +306,7 @@ def test_circles_of_dense_targets_leave_the_curve_to_be_seen() -> None:
 @pytest.mark.parametrize("point_angle", [-178.0, 0.0, 12.0])
 @pytest.mark.parametrize("rotation", [0.0, 1.0, 3.0])
 def test_numbers_of_dimensions_cover_neither_each_other_nor_other_dimensions(point_angle, rotation) -> None:
-    solution = syn.Solution.from_linkage(
-        syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=radians(point_angle))
-    )
-    dimensions = syn.drawing(solution, rotation).dimensions
+    dimensions = syn.drawing(timed(replace(LINKAGE, point_angle=radians(point_angle))), rotation).dimensions
     assert len(dimensions) == 5
     for one in dimensions:
         (x0, y0), (x1, y1) = one.line
@@ -351,7 +344,7 @@ def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
     for closed in (True, False):
         target = next(p for p in syn.drawing(untimed(closed)).polylines if p.layer == "target")
         assert target.closed is closed
-    flat = syn.Solution.from_linkage(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
+    flat = timed(replace(LINKAGE, point_angle=0.0))
     assert not any(p.layer == "coupler" for p in syn.drawing(flat).polylines)
 
 
@@ -379,8 +372,8 @@ def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
     # a plate with two holes: a rectangle between half circles
     crank = Polygon(flatten(outlines[1]))
     assert crank.area == pytest.approx(0.05 * 0.02 + np.pi * 0.01**2, rel=1e-3)
-    for outline in outlines:
-        plate = Polygon(flatten(outline))
+    for plate_outline in outlines:
+        plate = Polygon(flatten(plate_outline))
         inside = [Point(c.centre) for c in cut.circles if plate.contains(Point(c.centre))]
         assert inside
         for hole in inside:
@@ -464,7 +457,7 @@ def test_the_columns_of_an_untimed_path_are_its_nearest_points(closed) -> None:
 def test_an_open_path_may_be_judged_from_any_number_of_rotations() -> None:
     # the curve is a part of the linkage's own: the stations lie on it
     points = LINKAGE.path(np.linspace(0.1, 2.0, 9))
-    task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=False))
+    task = outline(points, closed=False)
     few, many = (syn.Solution.from_linkage(task, LINKAGE, np.linspace(0.1, 2.0, n)) for n in (2, 50))
     assert syn.assess(few).dimensions == syn.assess(many).dimensions
     assert len(figures.plot_sheet(few).axes) == 4
@@ -555,7 +548,7 @@ def test_free_rotations_start_near_zero_and_equal_errors_lie_within_the_picture(
     """As those of a straight line that is given by its two ends."""
     at = np.array([0.5, 1.2])
     ends = LINKAGE.path(at) + np.array([[1e-3, 0.0], [-1.0001e-3, 0.0]])
-    task = syn.UntimedPath(path=syn.TargetPath(points=ends, closed=False))
+    task = outline(ends, closed=False)
     solution = syn.Solution.from_linkage(task, LINKAGE, at + 4.0 * pi)
     np.testing.assert_allclose(solution.rotation, at, atol=1e-14)
     panel = axis_of(figures.plot(solution), "error")

@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
 from analysis.run import symbolic_equations
-from analysis.synthesis.linkage.kernels import (
-    COLUMNS,
-    coupler_path,
-    coupler_path_jacobian,
-    link_directions,
-    link_jacobian,
-    many_directions,
-    match_windows,
-)
+from analysis.synthesis.linkage import kernels
 from linkwork.five_bar.parameters import Constants
 from tests.linkages import drawn
 
@@ -43,7 +35,7 @@ def case(seed: int, n: int = 7) -> tuple[FloatArray, FloatArray, FloatArray, Flo
 def evaluated(
     kernel: Any, rows: int, phi: FloatArray, dx: FloatArray, dy: FloatArray, q: FloatArray, branch: float
 ) -> tuple[FloatArray, FloatArray]:
-    out, jacobian = np.empty((rows, len(phi))), np.empty((len(COLUMNS), rows, len(phi)))
+    out, jacobian = np.empty((rows, len(phi))), np.empty((len(kernels.COLUMNS), rows, len(phi)))
     kernel(np.cos(phi), np.sin(phi), dx, dy, q, branch, out, jacobian)
     return out, jacobian
 
@@ -56,9 +48,9 @@ def function() -> Any:
     """
     casadi = symbolic.library()
     plant = symbolic_equations(FIVE_BAR)
-    z = casadi.SX.sym("z", len(COLUMNS))
+    z = casadi.SX.sym("z", len(kernels.COLUMNS))
     phi, branch = casadi.SX.sym("phi"), casadi.SX.sym("branch")
-    v = dict(zip(COLUMNS, casadi.vertsplit(z)))
+    v = dict(zip(kernels.COLUMNS, casadi.vertsplit(z)))
     known = {
         "l1": v["ground_length"],
         "l2": v["crank_length"],
@@ -84,8 +76,8 @@ def function() -> Any:
 def test_path_angles_and_jacobians_are_those_of_the_plant(seed: int) -> None:
     pytest.importorskip("casadi")
     phi, dx, dy, q, branch = case(seed)
-    path, path_jacobian = evaluated(coupler_path_jacobian, 2, phi, dx, dy, q, branch)
-    angles, angle_jacobian = evaluated(link_jacobian, 2, phi, dx, dy, q, branch)
+    path, path_jacobian = evaluated(kernels.coupler_path_jacobian, 2, phi, dx, dy, q, branch)
+    angles, angle_jacobian = evaluated(kernels.link_jacobian, 2, phi, dx, dy, q, branch)
     for j in range(len(phi)):
         values, jacobian = (np.asarray(a) for a in function()(np.append(q, [dx[j], dy[j]]), phi[j], branch))
         np.testing.assert_allclose(path[:, j], values[:2, 0], rtol=0.0, atol=1e-13)
@@ -97,11 +89,11 @@ def test_path_angles_and_jacobians_are_those_of_the_plant(seed: int) -> None:
 def test_with_and_without_derivatives_the_path_is_the_same() -> None:
     phi, dx, dy, q, branch = case(5, 72)
     path = np.empty((2, 72))
-    coupler_path(np.cos(phi), np.sin(phi), dx, dy, q, branch, path)
-    np.testing.assert_allclose(path, evaluated(coupler_path_jacobian, 2, phi, dx, dy, q, branch)[0], atol=1e-14)
+    kernels.coupler_path(np.cos(phi), np.sin(phi), dx, dy, q, branch, path)
+    np.testing.assert_allclose(path, evaluated(kernels.coupler_path_jacobian, 2, phi, dx, dy, q, branch)[0], atol=1e-14)
     directions = np.empty((6, 72))
-    link_directions(np.cos(phi), np.sin(phi), dx, dy, q, branch, directions)
-    angles = evaluated(link_jacobian, 2, phi, dx, dy, q, branch)[0]
+    kernels.link_directions(np.cos(phi), np.sin(phi), dx, dy, q, branch, directions)
+    angles = evaluated(kernels.link_jacobian, 2, phi, dx, dy, q, branch)[0]
     np.testing.assert_allclose(directions[0] + 1j * directions[1], np.exp(1j * angles[0]), atol=1e-14)
     np.testing.assert_allclose(directions[2] + 1j * directions[3], np.exp(1j * angles[1]), atol=1e-14)
     np.testing.assert_allclose(directions[4] + 1j * directions[5], np.exp(1j * (angles[1] - angles[0])), atol=1e-14)
@@ -111,7 +103,7 @@ def test_links_that_cannot_be_joined_leave_a_nan() -> None:
     q = np.array([0.0, 0.0, 1.0, 0.9, 0.5, 0.6, 0.3, 0.0, 0.0, 0.0])
     phi = np.array([0.5, pi])
     zero = np.zeros(2)
-    path, jacobian = evaluated(coupler_path_jacobian, 2, phi, zero, zero, q, 1.0)
+    path, jacobian = evaluated(kernels.coupler_path_jacobian, 2, phi, zero, zero, q, 1.0)
     assert np.isfinite(path[:, 0]).all()
     assert np.isnan(path[:, 1]).all()
     assert np.isnan(jacobian[2:, :, 1]).any()
@@ -126,11 +118,11 @@ def test_many_linkages_at_once_are_one_after_the_other() -> None:
         coupler = np.empty((5, 11), dtype=complex)
         rocker = np.empty((5, 11), dtype=complex)
         waves = np.cos(phi), np.sin(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)
-        many_directions(*waves, shapes, branch, coupler, rocker)
+        kernels.many_directions(*waves, shapes, branch, coupler, rocker)
         for row, linkage in enumerate(drawings):
             g = np.empty((6, 11))
             second = 0.03 * np.exp(1j * (2.0 * phi + 0.4))
-            link_directions(*waves[:2], second.real.copy(), second.imag.copy(), linkage.vector, branch, g)
+            kernels.link_directions(*waves[:2], second.real.copy(), second.imag.copy(), linkage.vector, branch, g)
             np.testing.assert_allclose(coupler[row], g[0] + 1j * g[1], atol=1e-13)
             np.testing.assert_allclose(rocker[row], g[2] + 1j * g[3], atol=1e-13)
 
@@ -151,7 +143,7 @@ class TestMatchWindows:
         spans = np.array([10, 20, 28, 48, 90])
         curves = self.CURVE[None, :].copy()
         curves[:, gap] = np.nan
-        match_windows(curves, target - target.mean(), np.arange(0, 128, 4), spans, best)
+        kernels.match_windows(curves, target - target.mean(), np.arange(0, 128, 4), spans, best)
         return best[0]
 
     @pytest.mark.parametrize(("start", "span"), [(8, 28), (112, 48), (64, 90)])

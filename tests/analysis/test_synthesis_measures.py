@@ -24,7 +24,7 @@ from analysis.synthesis.search.program import Program, make_start
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.target import even_odd_area
 from analysis.synthesis.task.task import Measure, Objective
-from tests.linkages import BASE, drawn
+from tests.linkages import BASE, drawn, outline
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
@@ -89,10 +89,7 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
     known = drawn(random, least=0.7)
     turned = np.linspace(0.0, 2.0 * pi if closed else 3.0, 60, endpoint=not closed)
     points = known.path(turned) * 1.05
-    task = syn.UntimedPath(
-        path=syn.TargetPath(points=points, closed=closed),
-        weights=None if weights is None else np.linspace(1.0, 2.0, 60),
-    )
+    task = outline(points, closed=closed, weights=None if weights is None else np.linspace(1.0, 2.0, 60))
     normal = syn.normal_form(task)
     program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
     refinement = Refinement(program)
@@ -130,14 +127,12 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     normal = syn.normal_form(task)
     program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
     refinement = Refinement(program)
-    z, parameters = program.unknowns_and_parameters(
-        make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n))
-    )
+    start = make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n))
+    z, parameters = program.unknowns_and_parameters(start)
     curve, slopes = refinement.trace(z, parameters)
     some = [np.arange(len(near.distance)) for near in refinement.both_distances(curve)]
-    down = _Descent(
-        refinement, z, parameters, refinement._scaled_directions(curve, slopes), refinement.measure(curve), some
-    )
+    directions = refinement._scaled_directions(curve, slopes)
+    down = _Descent(refinement, z, parameters, directions, refinement.measure(curve), some)
     (held,) = (c for c in down.constraints() if c["type"] == "ineq")
     y = down.begin() + 1e-3 * np.random.default_rng(1).normal(size=len(down.begin()))
     exact = held["jac"](y)
@@ -150,10 +145,8 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     free = program.g_low != program.g_high
     rooms = []
     for more in (0.0, 0.5):
-        program.g_low, program.g_high = (
-            np.where(free, -1.0 - more, program.g_low),
-            np.where(free, 1.0 + more, program.g_high),
-        )
+        program.g_low = np.where(free, -1.0 - more, program.g_low)
+        program.g_high = np.where(free, 1.0 + more, program.g_high)
         (held,) = (c for c in down.constraints() if c["type"] == "ineq")
         rooms.append(held["fun"](y)[: 2 * free.sum()])
     assert free.any()
@@ -191,11 +184,8 @@ def best_circle(path: syn.TargetPath) -> float:
     middle = np.ravel(shapely.LinearRing(path.points).centroid.xy)
     centres = (middle, 0.5 * (path.points.min(axis=0) + path.points.max(axis=0)))
     size = float(np.hypot(*np.ptp(path.points, axis=0)))
-    return min(
-        syn.area_difference(circle(radius, centre).path(syn.turn(360)), path)
-        for centre in centres
-        for radius in np.linspace(0.1, 0.7, 61) * size
-    )
+    circles = [circle(radius, centre) for centre in centres for radius in np.linspace(0.1, 0.7, 61) * size]
+    return min(syn.area_difference(one.path(syn.turn(360)), path) for one in circles)
 
 
 def test_a_square_is_traced_better_than_by_a_circle() -> None:
@@ -234,11 +224,7 @@ def test_a_guess_that_keeps_the_constraints_is_never_lost(seed: int, timed: bool
     random = np.random.default_rng(seed)
     known = drawn(random, least=0.75)
     points = known.path(syn.turn(24)) + 0.01 * random.normal(size=(24, 2))
-    task: syn.Task = (
-        syn.TimedPath(points=points)
-        if timed
-        else syn.UntimedPath(path=syn.TargetPath(points=points, closed=True), samples=24)
-    )
+    task: syn.Task = syn.TimedPath(points=points) if timed else outline(points, samples=24)
     guess = syn.Solution.from_linkage(task, known)
     found = syn.synthesize(task, constraints=(), guesses=[guess], search=syn.Search(candidates=16, starts=1, seed=seed))
     assert found.best.error <= guess.error
@@ -293,10 +279,8 @@ def test_what_a_linkage_violates_is_named() -> None:
     solution = syn.Solution.from_linkage(task, known)
     angle = min(solution.verdicts.least_transmission, pi - solution.verdicts.greatest_transmission)
     longest = solution.largest_link
-    assert (
-        worst_violation(solution, None, [syn.LeastTransmission(angle=angle - 1e-6), syn.LargestLink(length=longest)])
-        == ""
-    )
+    kept = [syn.LeastTransmission(angle=angle - 1e-6), syn.LargestLink(length=longest)]
+    assert worst_violation(solution, None, kept) == ""
     named = worst_violation(solution, None, [syn.LeastTransmission(angle=angle + radians(2.0))])
     assert named.startswith("transmission angle by ")
     assert float(named.split()[-2]) == pytest.approx(2.0, rel=0.05)
@@ -330,10 +314,8 @@ def test_a_timed_path_may_dwell() -> None:
     assert best.verdicts.sound
     assert best.error == pytest.approx(float(((best.linkage.path(syn.turn(24)) - points) ** 2).sum()))
     z, crank = points @ [1.0, 1j], np.exp(1j * syn.turn(24))
-    circles = [
-        np.linalg.lstsq(np.column_stack([np.ones(24), way]), z, rcond=None)[1][0] for way in (crank, crank.conj())
-    ]
-    assert best.error < 0.5 * min(circles)
+    ways = (np.column_stack([np.ones(24), way]) for way in (crank, crank.conj()))
+    assert best.error < 0.5 * min(np.linalg.lstsq(way, z, rcond=None)[1][0] for way in ways)
 
 
 @pytest.mark.parametrize("rotation", [None, np.linspace(0.0, 1.2, 5)])
@@ -428,9 +410,8 @@ def test_the_greatest_error_of_a_slider_is_that_of_scipys_minimax() -> None:
 @pytest.mark.slow
 def test_the_hausdorff_distance_of_a_square() -> None:
     path = syn.TargetPath(points=SQUARE, closed=True)
-    found = syn.synthesize(
-        syn.UntimedPath(path=path, objective="worst"), search=syn.Search(candidates=1 << 10, starts=2)
-    ).best
+    search = syn.Search(candidates=1 << 10, starts=2)
+    found = syn.synthesize(syn.UntimedPath(path=path, objective="worst"), search=search).best
     assert found.value == pytest.approx(syn.hausdorff(found.curve(), path), rel=1e-9)
     # 0.134 with stations on the target's normals, 0.174 of the least area
     assert found.value < 0.115 < 0.15 < syn.hausdorff(traced("square").curve(), path)

@@ -53,9 +53,8 @@ class TestLiterature:
         assert usual.linkage.least_transmission >= 0.698
 
     def test_six_points_of_a_vertical_line_are_met(self) -> None:
-        solution = best(
-            syn.PrecisionPoints(points=VERTICAL), constraints=[syn.FullTurn(), syn.LargestLink(length=60.0)], starts=12
-        )
+        limits = [syn.FullTurn(), syn.LargestLink(length=60.0)]
+        solution = best(syn.PrecisionPoints(points=VERTICAL), constraints=limits, starts=12)
         assert solution.evaluation.worst < 1e-6
 
 

@@ -19,7 +19,7 @@ from analysis.synthesis.result.report import displacements
 from analysis.synthesis.search.polish import Polished, polish
 from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
-from tests.linkages import drawn, ellipse, scaled
+from tests.linkages import drawn, ellipse, outline, scaled
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
@@ -31,11 +31,8 @@ QUICK = syn.Search(candidates=1 << 12, starts=4)
 
 class TestResult:
     def test_solutions_are_ranked_different_and_what_they_say(self) -> None:
-        result = syn.synthesize(
-            TASK,
-            search=syn.Search(starts=12, candidates=1 << 13),
-            constraints=[*syn.USUAL, syn.LargestLink(length=0.3)],
-        )
+        search, size = syn.Search(starts=12, candidates=1 << 13), syn.LargestLink(length=0.3)
+        result = syn.synthesize(TASK, search=search, constraints=[*syn.USUAL, size])
         errors = [s.error for s in result.solutions]
         assert errors == sorted(errors)
         assert result.best is result.solutions[0]
@@ -52,7 +49,7 @@ class TestResult:
 
     @pytest.mark.slow
     def test_the_same_seed_gives_the_same_bits_on_any_number_of_cores(self) -> None:
-        tasks = (TASK, syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=24))
+        tasks = (TASK, outline(ELLIPSE, samples=24))
         for task in tasks:
             one, again, two = (syn.synthesize(task, search=replace(QUICK, seed=5, n_jobs=n)) for n in (1, 1, 2))
             for other in (again, two):
@@ -116,36 +113,25 @@ def judged(kind: str) -> syn.Solution:
     phi = np.linspace(0.0, 4.0, 9)
     weights = np.linspace(1.0, 3.0, 9)
     points = off(linkage.path(phi))
+    timed = syn.TimedPath(points=points, rotation=phi, weights=weights)
     if kind == "slider":
         a = 0.05 * linkage.crank_length
         pivot = syn.SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
-        return syn.Solution.from_linkage(
-            syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(pivot)
-        )
+        return syn.Solution.from_linkage(timed, linkage.with_pivot(pivot))
     if kind == "five-bar":
         series = FourierSeries(np.array([0.0, 0.2, -0.1]), np.array([0.0, 0.3, 0.1]))
         arm = syn.SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
-        return syn.Solution.from_linkage(
-            syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(arm)
-        )
+        return syn.Solution.from_linkage(timed, linkage.with_pivot(arm))
+    rocker, coupler = (angle(phi) + 0.02 * phi for angle in (linkage.rocker_angle, linkage.coupler_angle))
     task: Any = {
-        "timed": lambda: syn.TimedPath(points=points, rotation=phi, weights=weights),
-        "rocker": lambda: syn.RockerFunction(
-            angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights
-        ),
-        "motion": lambda: syn.Motion(
-            points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, rotation=phi, weights=weights
-        ),
-        "poses": lambda: syn.Motion(points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, weights=weights),
+        "timed": lambda: timed,
+        "rocker": lambda: syn.RockerFunction(angle=rocker, rotation=phi, weights=weights),
+        "motion": lambda: syn.Motion(points=points, angle=coupler, rotation=phi, weights=weights),
+        "poses": lambda: syn.Motion(points=points, angle=coupler, weights=weights),
         "precision": lambda: syn.PrecisionPoints(points=points),
-        "closed": lambda: syn.UntimedPath(
-            path=syn.TargetPath(points=1.02 * linkage.path(syn.turn(90)), closed=True), measure="distance"
-        ),
-        "open": lambda: syn.UntimedPath(
-            path=syn.TargetPath(points=off(linkage.path(np.linspace(0.0, 4.0, 40)), 1e-3), closed=False),
-            measure="distance",
-        ),
-        "area": lambda: syn.UntimedPath(path=syn.TargetPath(points=1.02 * linkage.path(syn.turn(90)), closed=True)),
+        "closed": lambda: outline(1.02 * linkage.path(syn.turn(90)), measure="distance"),
+        "open": lambda: outline(off(linkage.path(np.linspace(0.0, 4.0, 40)), 1e-3), closed=False, measure="distance"),
+        "area": lambda: outline(1.02 * linkage.path(syn.turn(90))),
     }[kind]()
     rotation = phi if kind in ("poses", "precision") else None
     if kind == "open":
@@ -245,7 +231,7 @@ class TestRounding:
 
     def test_expected_of_an_area_that_is_as_small_as_it_can_be(self) -> None:
         """Distances of either sign, few stations, and a target of few points: what is added starts from the area itself."""
-        task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=36)
+        task = outline(ELLIPSE, samples=36)
         solution = syn.synthesize(task, search=QUICK).best
         random = np.random.default_rng(0)
         errors = []
@@ -267,17 +253,15 @@ class TestRounding:
         angle = radians(2.0)
 
         def mean(name: str) -> float:
-            ends = [
-                syn.evaluate(task, replace(solution.linkage, **{name: getattr(solution.linkage, name) + d})).error
-                for d in (-angle / 2.0, angle / 2.0)
-            ]
+            value = getattr(solution.linkage, name)
+            changed = (replace(solution.linkage, **{name: value + d}) for d in (-angle / 2.0, angle / 2.0))
+            ends = [syn.evaluate(task, linkage).error for linkage in changed]
             return (ends[0] + 4.0 * solution.error + ends[1]) / 6.0
 
         # of the angles, only these two turn the rocker
         grown = sum(mean(name) - solution.error for name in ("crank_phase", "output_angle"))
-        assert syn.round_dimensions(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(
-            grown, rel=1e-3
-        )
+        expected = syn.round_dimensions(solution, length=1e-9, angle=angle).expected
+        assert expected - solution.error == pytest.approx(grown, rel=1e-3)
 
     def test_output_angle_and_moved_pivot_are_rounded_the_commanded_motion_is_not(self) -> None:
         motion = judged("motion")
@@ -294,12 +278,9 @@ class TestRounding:
         """A link is not rounded away, and the error stays in proportion to the linkage."""
         linkage = scaled(known(), factor)
         solution = syn.Solution.from_linkage(syn.TimedPath(points=off(known().path(syn.turn(9))) * factor), linkage)
-        rounding = syn.round_dimensions(solution)
-        assert rounding.error == pytest.approx(solution.error, rel=0.3)
-        assert (
-            syn.round_dimensions(solution, length=10.0 * linkage.largest_link).linkage.crank_length
-            == 10.0 * linkage.largest_link
-        )
+        assert syn.round_dimensions(solution).error == pytest.approx(solution.error, rel=0.3)
+        step = 10.0 * linkage.largest_link
+        assert syn.round_dimensions(solution, length=step).linkage.crank_length == step
 
     @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
     def test_steps_are_above_zero(self, step: float) -> None:
@@ -359,9 +340,7 @@ class TestTradeOff:
             raise syn.SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
 
         monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
-        with pytest.raises(
-            syn.TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off"
-        ) as caught:
+        with pytest.raises(syn.TradeOffInterrupted, match=f"stopped after {stop} of 4 problems") as caught:
             syn.trade_off(TASK, "size", [0.3, 0.6], search=syn.Search(starts=1))
         front = caught.value.trade_off
         there = [s is not None for s in front.solutions]
@@ -456,14 +435,12 @@ class TestStraight:
     def test_a_straight_part_is_flat_and_quick(self) -> None:
         points = np.array([[0, 0], [0.5, 0], [1, 0], [1.1, 0.25], [0.9, 0.4], [0.5, 0.45], [0.1, 0.4], [-0.1, 0.25]])
         straight = syn.Straight(start=0, end=2, rotation=2.2, flatness=0.02)
-        task = syn.UntimedPath(
-            path=syn.TargetPath(points=points, closed=True), measure="distance", samples=36, straight=straight
+        task = outline(points, measure="distance", samples=36, straight=straight)
+        search, limits = (
+            syn.Search(starts=6, candidates=1 << 13),
+            [syn.LeastTransmission(), syn.LargestLink(length=4.0)],
         )
-        solution = syn.synthesize(
-            task,
-            search=syn.Search(starts=6, candidates=1 << 13),
-            constraints=[syn.LeastTransmission(), syn.LargestLink(length=4.0)],
-        ).best
+        solution = syn.synthesize(task, search=search, constraints=limits).best
         rotation = solution.evaluation.rotation
         assert rotation is not None
 
@@ -500,52 +477,25 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("make", "message"),
         [
-            (
-                lambda: syn.PrecisionPoints(points=[[0, 0], [1, 1], [1, 1]]),
-                r"numbers 1 and 2 are the same, \[1.0, 1.0\] m; leave one out, or give crank rotations for a dwell",
-            ),
-            (
-                lambda: syn.Motion(points=[[0, 0], [1, 1], [1, 1]], angle=[0, 1, 1]),
-                r"numbers 1 and 2 are the same, \[1.0, 1.0\] m at 1 rad; leave one out",
-            ),
+            (lambda: syn.PrecisionPoints(points=[[0, 0], [1, 1], [1, 1]]), r"2 are the same, \[1.0, 1.0\] m;.* dwell"),
+            (lambda: syn.Motion(points=[[0, 0], [1, 1], [1, 1]], angle=[0, 1, 1]), r"same, \[1.0, 1.0\] m at 1 rad"),
             (lambda: syn.TimedPath(points=[[0, 0], [1, 1]]), "2 are too few, there must be at least 3"),
             (lambda: syn.TimedPath(points=[[1, 2]] * 4), r"all target points are the same, \[1.0, 2.0\] m"),
             (lambda: syn.PrecisionPoints(points=[[1, 2]] * 3, rotation=[0, 1, 2]), "all precision points are the same"),
-            (
-                lambda: syn.RockerFunction(angle=np.full(8, 1.2)),
-                "all target angles are the same, 1.2 rad: a rocker that stands still needs no linkage",
-            ),
-            (
-                lambda: syn.TimedPath(points=ELLIPSE, objective="least"),
-                "objective is 'least': it must be 'error' or 'worst'",
-            ),
-            (
-                lambda: syn.TimedPath(points=ELLIPSE, rotation=syn.turn(5)),
-                "there must be one for each of the 24 targets",
-            ),
-            (
-                lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
-                "crank rotations 1 and 2 are 2 and 1 rad: they must go one way",
-            ),
+            (lambda: syn.RockerFunction(angle=np.full(8, 1.2)), "target angles are the same, 1.2 rad: .* no linkage"),
+            (lambda: syn.TimedPath(points=ELLIPSE, objective="least"), "objective is 'least': .* 'error' or 'worst'"),
+            (lambda: syn.TimedPath(points=ELLIPSE, rotation=syn.turn(5)), "one for each of the 24 targets"),
+            (lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]), "1 and 2 are 2 and 1 rad: .* one way"),
             (lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "they may span one turn at most"),
             (lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[1, -1, 1]), "weight 1 is -1: none may be below zero"),
-            (
-                lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]),
-                "weight 0 is 0: none may be below zero, nor all be zero",
-            ),
+            (lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]), "weight 0 is 0: .* nor all be zero"),
             (lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[1.0, 2.0]), r"weights have the shape \(2,\)"),
             (lambda: syn.RockerFunction(angle=[1.0, 2.0]), "must be a list of at least 3"),
             (lambda: syn.RockerFunction(angle=[1.0, 2.0, np.inf]), "target angles: number 2 is inf"),
             (lambda: syn.Motion(points=ELLIPSE[:3], angle=[1.0, 2.0]), "target angles have the shape"),
             (lambda: syn.Motion(points=ELLIPSE[:3], angle=[1, 2, 3], length=-1.0), "length is -1.0"),
-            (
-                lambda: syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=4),
-                "4 samples of a path",
-            ),
-            (
-                lambda: syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), measure="mean"),
-                "measure is 'mean'",
-            ),
+            (lambda: outline(ELLIPSE, samples=4), "4 samples of a path"),
+            (lambda: outline(ELLIPSE, measure="mean"), "measure is 'mean'"),
             (lambda: syn.Straight(start=3, end=3, rotation=1.0), "it must run forward"),
             (lambda: syn.Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
             (lambda: syn.Straight(start=0, end=3, rotation=6.3), "crank rotation of the straight part is 6.3"),
@@ -564,11 +514,7 @@ class TestBadInput:
             ({"search": {"n_jobs": 0}}, InputError, "0 cores"),
             ({"constraints": ["short"]}, InputError, "'short' is not a constraint: use .*LeastTransmission"),
             ({"bounds": {"crank": (0, 1)}}, ParameterError, "no dimension 'crank'.* crank_length"),
-            (
-                {"bounds": {"crank_length": (0.2, 0.1)}},
-                syn.InfeasibleError,
-                "crank_length is to be at least 0.2 m and at most 0.1 m: no value is",
-            ),
+            ({"bounds": {"crank_length": (0.2, 0.1)}}, syn.InfeasibleError, "at least 0.2 m and at most 0.1 m"),
             (
                 {"constraints": [syn.LargestLink(length="5 mm")]},
                 syn.InfeasibleError,
@@ -592,11 +538,7 @@ class TestBadInput:
                 syn.InfeasibleError,
                 "Grashof types crank-rocker, drag-link are asked for at once",
             ),
-            (
-                {"constraints": [*syn.USUAL, syn.Grashof(type="triple-rocker")]},
-                syn.InfeasibleError,
-                "the crank of a triple-rocker does not turn fully",
-            ),
+            ({"constraints": [*syn.USUAL, syn.Grashof(type="triple-rocker")]}, syn.InfeasibleError, "not turn fully"),
             (
                 {"constraints": [syn.Toggle(at=1.0)]},
                 syn.InfeasibleError,
@@ -610,7 +552,7 @@ class TestBadInput:
             (
                 {
                     "bounds": {"pivot_x": (5.0, 5.0), "crank_length": (0.3, 0.5)},
-                    "constraints": [*syn.USUAL, syn.LargestLink(length=0.3)],
+                    "constraints": [syn.LargestLink(length=0.3)],
                 },
                 syn.InfeasibleError,
                 r"the crank shaft is to be \d+ mm from it at least, and .* of at most 300 mm and 300 mm, reach 600 mm",
@@ -645,18 +587,17 @@ class TestBadInput:
             assert 0.9 - 1e-6 < best.pivot_y < 1.9 - best.pivot_x + 1e-6
 
     def test_an_open_path_needs_rotations_to_be_compared(self) -> None:
-        task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE[:9], closed=False))
+        task = outline(ELLIPSE[:9], closed=False)
         with refused("an open path has no crank rotations of its own"):
             syn.evaluate(task, known())
         with refused("say at which ones the linkage is to be compared"):
             syn.evaluate(syn.PrecisionPoints(points=ELLIPSE[:4]), known())
 
     def test_where_it_cannot_be_joined_the_error_is_infinite_not_nan(self) -> None:
-        linkage = syn.Linkage(
-            ground_length=1.0, crank_length=0.5, coupler_length=0.6, rocker_length=0.7, point_distance=0.3
-        )
+        links = {"ground_length": 1.0, "crank_length": 0.5, "coupler_length": 0.6, "rocker_length": 0.7}
+        linkage = syn.Linkage(**links, point_distance=0.3)
         assert syn.evaluate(TASK, linkage).error == np.inf
-        assert syn.evaluate(syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True)), linkage).error == np.inf
+        assert syn.evaluate(outline(ELLIPSE), linkage).error == np.inf
         assert syn.evaluate(syn.RockerFunction(angle=syn.turn(8)), linkage).error == np.inf
         assert not syn.Solution.from_linkage(TASK, linkage).verdicts.sound
 
@@ -675,9 +616,8 @@ class TestLimits:
         both = (syn.LeastTransmission(angle=radians(15.0)), syn.LeastTransmission(angle=radians(60.0), over="task"))
         best = syn.synthesize(task, constraints=both, search=QUICK).best
         assert best.linkage.least_transmission >= radians(15.0) - 1e-6
-        assert (
-            min(best.verdicts.least_transmission, np.pi - best.verdicts.greatest_transmission) >= radians(60.0) - 1e-4
-        )
+        least, greatest = best.verdicts.least_transmission, best.verdicts.greatest_transmission
+        assert min(least, np.pi - greatest) >= radians(60.0) - 1e-4
         normal = syn.normal_form(task)
         limits = make_limits(task, normal, None, both)
         assert (limits.turn, limits.way) == (radians(15.0), radians(60.0))
@@ -701,23 +641,15 @@ class TestLimits:
             (x - half, y - half), (x - 0.01, y - half), (x, y - 0.016), (x + 0.01, y - half),
             (x + half, y - half), (x + half, y + half), (x - half, y + half),
         ]  # fmt: skip
-        task = syn.TimedPath(
-            points=np.column_stack([0.2 + 0.1 * np.cos(syn.turn(24)), 0.15 + 0.05 * np.sin(syn.turn(24))])
-        )
-        cap = syn.LargestLink(length=1.1285)
+        usual, search = (*syn.USUAL, syn.LargestLink(length=1.1285)), syn.Search(starts=8, candidates=1 << 13)
         region = syn.PivotRegion(pivot="A", polygon=notched)
-        best = syn.synthesize(
-            task, constraints=(*syn.USUAL, cap, region), search=syn.Search(starts=8, candidates=1 << 13)
-        ).best
+        best = syn.synthesize(TASK, constraints=(*usual, region), search=search).best
         boxes = [
             {"pivot_x": (x - half, x - 0.01), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x + 0.01, x + half), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x - half, x + half), "pivot_y": (y - 0.016, y + half)},
         ]
-        inner = min(
-            syn.synthesize(task, box, (*syn.USUAL, cap), search=syn.Search(starts=8, candidates=1 << 13)).best.error
-            for box in boxes
-        )
+        inner = min(syn.synthesize(TASK, box, usual, search=search).best.error for box in boxes)
         assert best.error <= inner * (1.0 + 1e-6)
 
     def test_exact_points_are_ranked_by_their_transmission_angle(self) -> None:
@@ -730,9 +662,8 @@ class TestLimits:
         assert angles == sorted(angles, reverse=True)
 
     def test_the_closing_step_of_a_turn_counts(self) -> None:
-        linkage = syn.Linkage(
-            ground_length=1.0, crank_length=0.91687, coupler_length=1.00396, rocker_length=1.25461, crank_phase=0.51262
-        )
+        links = {"ground_length": 1.0, "crank_length": 0.91687, "coupler_length": 1.00396, "rocker_length": 1.25461}
+        linkage = syn.Linkage(**links, crank_phase=0.51262)
         assert not linkage.turns_fully
         solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(8))), linkage)
         assert not solution.verdicts.sound
@@ -741,20 +672,14 @@ class TestLimits:
         path = syn.TargetPath(points=ELLIPSE, closed=True)
         linkage = syn.synthesize(syn.UntimedPath(path=path, samples=24), search=QUICK).best.linkage
         shifted = replace(linkage, pivot_x=linkage.pivot_x + 1e-3)
-        plain, twice = (
-            syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error
-            for w in (1.0, 2.0)
-        )
-        assert twice == pytest.approx(2.0 * plain, rel=1e-12)
+
+        def error(weights: FloatArray) -> float:
+            return syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=weights), shifted).error
+
+        even = np.ones(len(ELLIPSE))
+        plain = error(even)
+        assert error(2.0 * even) == pytest.approx(2.0 * plain, rel=1e-12)
         # all but even weights take the other way to nearly the same area
-        weights = np.ones(len(ELLIPSE))
-        weights[0] = 1.0 + 1e-9
-        assert syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(
-            plain, rel=0.03
-        )
+        assert error(even + 1e-9 * (np.arange(len(ELLIPSE)) == 0)) == pytest.approx(plain, rel=0.03)
         right = np.where(ELLIPSE[:, 0] > ELLIPSE[:, 0].mean(), 1.0, 0.0)
-        left = 1.0 - right
-        halves = [
-            syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=w), shifted).error for w in (left, right)
-        ]
-        assert sum(halves) == pytest.approx(plain, rel=0.05)
+        assert error(1.0 - right) + error(right) == pytest.approx(plain, rel=0.05)

@@ -14,6 +14,7 @@ from analysis.files import attribute_files, read_points, write_csv
 from analysis.synthesis import TargetPath, curve_distance, function_from_formula, path_from_formula
 from analysis.synthesis.task.target import even_odd_area, formula
 from linkwork.errors import InputError, ParameterError, UnknownNameError
+from tests.refusals import refused
 
 T = np.linspace(0.0, 2.0 * pi, 400, endpoint=False)
 SQUARE = TargetPath(points=np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]), closed=True)
@@ -292,18 +293,12 @@ def test_values_must_be_finite() -> None:
 
 
 def test_bad_ranges_and_units_are_refused() -> None:
-    with pytest.raises(InputError, match="the end must be greater"):
-        path_from_formula("t", "t**2", start=1.0, end=0.0)
-    with pytest.raises(InputError, match="the end must be greater"):
-        function_from_formula("t", end=float("inf"))
-    with pytest.raises(InputError, match="'t' is not known"):
-        path_from_formula("t", "t**2", end="t")
-    with pytest.raises(ParameterError, match="unit"):
-        path_from_formula("t", "t", unit="deg")
-    with pytest.raises(ParameterError, match="unit"):
-        function_from_formula("t", unit="cm")
-    with pytest.raises(InputError, match="at least 3"):
-        path_from_formula("cos(t)", "sin(t)", n=2)
+    refused(InputError, "the end must be greater", path_from_formula, "t", "t**2", start=1.0, end=0.0)
+    refused(InputError, "the end must be greater", function_from_formula, "t", end=float("inf"))
+    refused(InputError, "'t' is not known", path_from_formula, "t", "t**2", end="t")
+    refused(ParameterError, "unit", path_from_formula, "t", "t", unit="deg")
+    refused(ParameterError, "unit", function_from_formula, "t", unit="cm")
+    refused(InputError, "at least 3", path_from_formula, "cos(t)", "sin(t)", n=2)
 
 
 # Files
@@ -457,12 +452,9 @@ def test_named_curves_of_svg(tmp_path: Path) -> None:
     exact = np.column_stack([30.0 * s, -30.0 * s * (1 - s) * (1 - 2 * s)])
     assert curve_distance(wave, exact, closed=False).max() < 30.0 * 1e-4
     assert len(wave) < 200
-    with pytest.raises(UnknownNameError, match="did you mean wave"):
-        read_points(path, name="waves")
-    with pytest.raises(InputError, match="two has 2 curves"):
-        read_points(path, name="two")
-    with pytest.raises(InputError, match="empty has 0 curves"):
-        read_points(path, name="empty")
+    refused(UnknownNameError, "did you mean wave", read_points, path, name="waves")
+    refused(InputError, "two has 2 curves", read_points, path, name="two")
+    refused(InputError, "empty has 0 curves", read_points, path, name="empty")
 
 
 @pytest.mark.parametrize(
@@ -512,15 +504,10 @@ def test_bad_svg_is_refused(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
-        read_points(tmp_path / "none.csv")
-    with pytest.raises(InputError, match=r"'\.xls'"):
-        read_points(tmp_path / "a.xls")
-    with pytest.raises(InputError, match="cannot be selected"):
-        read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), name="curve")
-    with pytest.raises(ParameterError, match="unit"):
-        read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), unit="kg")
+    refused(InputError, "cannot be read", read_points, tmp_path / "none.csv")
+    refused(InputError, r"'\.xls'", read_points, tmp_path / "a.xls")
+    refused(InputError, "cannot be selected", read_points, save(tmp_path, "a.csv", "0,0\n1,1\n"), name="curve")
+    refused(ParameterError, "unit", read_points, save(tmp_path, "a.csv", "0,0\n1,1\n"), unit="kg")
     for content, encoding in ((b"\xe4,0", "UTF-8"), (b"\xff\xfe0", "UTF-16")):
         (tmp_path / "b.csv").write_bytes(content)
-        with pytest.raises(InputError, match=f"it is not text in {encoding}; save it as UTF-8"):
-            read_points(tmp_path / "b.csv")
+        refused(InputError, f"it is not text in {encoding}; save it as UTF-8", read_points, tmp_path / "b.csv")

@@ -6,22 +6,14 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from analysis import Inputs
-from analysis.linear import (
-    SampledController,
-    control_loop,
-    design_lqr,
-    design_pid,
-    find_equilibrium,
-    linearise,
-    linearise_orbit,
-)
+from analysis import Inputs, linear
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import TrackingController, inverse_dynamics, track
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from tests.refusals import refused
 
 pytest.importorskip("casadi")
 
@@ -40,12 +32,12 @@ def load(th2: float) -> tuple[float, float]:
 @pytest.fixture(scope="module")
 def model():
     """The mean linear model along the reference."""
-    return linearise_orbit(RIG, inverse_dynamics(RIG, MOTION, SPEED)).mean()
+    return linear.linearise_orbit(RIG, inverse_dynamics(RIG, MOTION, SPEED)).mean()
 
 
 @pytest.fixture(scope="module")
 def pid(model):
-    return design_pid(model, bandwidth=150.0)
+    return linear.design_pid(model, bandwidth=150.0)
 
 
 def run(
@@ -74,9 +66,8 @@ def test_the_known_load_is_fed_forward() -> None:
 def test_both_together_beat_either_alone(pid) -> None:
     """On a plant with friction, other masses and a load that the feed-forward knows nothing of."""
     wrong = {"plant": TRUE, "load": load, "revolutions": 5}
-    forward, back, both = (
-        run(**wrong, **kind).metrics() for kind in ({}, {"design": pid, "feedforward": False}, {"design": pid})
-    )
+    kinds = ({}, {"design": pid, "feedforward": False}, {"design": pid})
+    forward, back, both = (run(**wrong, **kind).metrics() for kind in kinds)
     assert both.rms_error < 5e-5
     assert forward.rms_error > 20.0 * both.rms_error
     assert back.rms_error > 6.0 * both.rms_error
@@ -110,11 +101,8 @@ def test_an_error_at_the_start_dies_out(pid) -> None:
 def test_the_run_may_start_anywhere_and_go_backwards(pid) -> None:
     """The reference goes with the crank: turned by an angle it is followed as well, and in the other direction."""
     start = 1.3
-    at = InitialState(
-        crank_angle=start,
-        slider_position=float(MOTION(start)),
-        slider_velocity=-SPEED * float(MOTION.derivative()(start)),
-    )
+    u, v = float(MOTION(start)), -SPEED * float(MOTION.derivative()(start))
+    at = InitialState(crank_angle=start, slider_position=u, slider_velocity=v)
     result = run(crank_speed=-SPEED, design=pid, initial=at, revolutions=3)
     assert np.abs(result.error).max() < 2e-6
     assert result.loop.reference == pytest.approx(MOTION(start - SPEED * result.loop.time), abs=1e-12)
@@ -127,10 +115,8 @@ def test_the_result_says_what_happened(pid) -> None:
     assert loop.trajectory.source.endswith("feed-forward + PID sampled")
     assert loop.time[-1] == pytest.approx(5.0 * pi / SPEED)
     p = RIG.constants()
-    wanted = [
-        kinematics.coupler_point(kinematics.position(th2, float(MOTION(th2)), p), p)
-        for th2 in loop.states[:, 0].tolist()
-    ]
+    angles = loop.states[:, 0].tolist()
+    wanted = [kinematics.coupler_point(kinematics.position(th2, float(MOTION(th2)), p), p) for th2 in angles]
     x, y = np.array(wanted).T
     distance = np.hypot(loop.trajectory["coupler.point.x"] - x, loop.trajectory["coupler.point.y"] - y)
     assert result.point_error == pytest.approx(distance, abs=1e-12)
@@ -151,12 +137,11 @@ def test_force_and_power_are_those_of_inverse_dynamics(pid) -> None:
 def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> None:
     """A reference that stands still: the law is that of a `SampledController` as it is there."""
     still = FourierSeries.constant(0.003)
-    design = design_lqr(model, {"slider.position": 1e7, "slider.velocity": 1e2}, integral=1e9)
+    design = linear.design_lqr(model, {"slider.position": 1e7, "slider.velocity": 1e2}, integral=1e9)
     start = InitialState(slider_position=0.0)
     result = run(RIG, still, design=design, feedforward=False, initial=start, revolutions=2)
-    loop = control_loop(
-        RIG, SampledController(design, PERIOD), 0.003, Inputs(speed=SPEED), initial=start, stop_time=4.0 * pi / SPEED
-    )
+    given = {"initial": start, "stop_time": 4.0 * pi / SPEED}
+    loop = linear.control_loop(RIG, linear.SampledController(design, PERIOD), 0.003, Inputs(speed=SPEED), **given)
     # the mean velocity about which the design was made is zero but for rounding
     assert result.loop.states == pytest.approx(loop.states, abs=1e-9)
     assert result.loop.force == pytest.approx(loop.force, abs=1e-6)
@@ -165,7 +150,7 @@ def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> 
 def test_a_controller_starts_each_run_afresh(pid) -> None:
     controller = TrackingController(RIG, MOTION, "1 ms", design=pid, limit="2 kN")
     options = {"initial": InitialState(crank_speed=SPEED), "stop_time": 0.05}
-    first, second = (control_loop(RIG, controller, 0.0, Inputs(speed=SPEED), **options).force for _ in range(2))
+    first, second = (linear.control_loop(RIG, controller, 0.0, Inputs(speed=SPEED), **options).force for _ in range(2))
     assert np.array_equal(first, second)
 
 
@@ -196,21 +181,15 @@ def test_a_run_that_loses_the_assembly_ends_there() -> None:
 
 
 def test_bad_runs_are_told(pid) -> None:
-    with pytest.raises(InputError, match="neither feed-forward nor feedback"):
-        run(feedforward=False)
-    with pytest.raises(InputError, match="limit of the force is 0"):
-        run(limit=0.0)
-    with pytest.raises(InputError, match="sampling period is 0"):
-        run(period=0.0)
-    with pytest.raises(InputError, match="shorter than a turn"):
-        run(revolutions=0.5).metrics()
-    with pytest.raises(InputError, match="-1 revolutions"):
-        run(revolutions=-1)
-    with pytest.raises(InputError, match="crank speed is 0"):
-        run(crank_speed=0.0)
-    with pytest.raises(AssemblyError, match="deg of the turn"):
-        run(RIG, MOTION * 100.0)
-    rest = find_equilibrium(TABLE_3_1)
-    free = design_lqr(linearise(TABLE_3_1, rest.state, rest.inputs), {"slider.position": 1e6, "crank.angle": 1.0})
-    with pytest.raises(InputError, match="free crank"):
-        TrackingController(RIG, MOTION, PERIOD, design=free)
+    refused(InputError, "neither feed-forward nor feedback", run, feedforward=False)
+    refused(InputError, "limit of the force is 0", run, limit=0.0)
+    refused(InputError, "sampling period is 0", run, period=0.0)
+    refused(InputError, "shorter than a turn", run(revolutions=0.5).metrics)
+    refused(InputError, "-1 revolutions", run, revolutions=-1)
+    refused(InputError, "crank speed is 0", run, crank_speed=0.0)
+    refused(AssemblyError, "deg of the turn", run, RIG, MOTION * 100.0)
+    rest = linear.find_equilibrium(TABLE_3_1)
+    free = linear.design_lqr(
+        linear.linearise(TABLE_3_1, rest.state, rest.inputs), {"slider.position": 1e6, "crank.angle": 1.0}
+    )
+    refused(InputError, "free crank", TrackingController, RIG, MOTION, PERIOD, design=free)

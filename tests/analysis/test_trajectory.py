@@ -20,8 +20,7 @@ def trajectory() -> Trajectory:
 
 
 def test_every_output_of_the_contract_is_there_by_name_with_its_unit(trajectory: Trajectory) -> None:
-    assert trajectory.names == FIVE_BAR.output_names
-    assert trajectory.values.shape == (101, 27)
+    assert (trajectory.names, trajectory.values.shape) == (FIVE_BAR.output_names, (101, 27))
     assert len(trajectory) == 101
     for i, name in enumerate(FIVE_BAR.output_names):
         assert np.array_equal(trajectory[name], trajectory.values[:, i])
@@ -96,11 +95,8 @@ def test_angles_are_unwrapped_where_their_turns_can_be_counted() -> None:
     """An angle that wraps goes on past pi; one that is sampled too rarely, a counted angle and all else stay as they are."""
     turned = np.linspace(3.0, -8.0, 12)
     wrapped = np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi
-    run = Trajectory(
-        time=np.arange(12.0),
-        values=np.column_stack([wrapped, 2.0 * np.arange(12.0), wrapped]),
-        names=("coupler.angle", "rocker.angle", "slider.position"),
-    )
+    values, names = np.column_stack([wrapped, 2.0 * np.arange(12.0), wrapped]), ("coupler.angle", "rocker.angle")
+    run = Trajectory(time=np.arange(12.0), values=values, names=(*names, "slider.position"))
     np.testing.assert_allclose(run.unwrapped("coupler.angle"), turned, atol=1e-12)
     for name in ("rocker.angle", "slider.position"):
         assert np.array_equal(run.unwrapped(name), run[name])

@@ -24,6 +24,7 @@ from analysis import (
     figures,
     frequency_response,
     natural_modes,
+    periodic,
     ramp,
     simulate,
     simulate_many,
@@ -34,22 +35,6 @@ from analysis.cli.vibration import _report_verdict
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linear import find_equilibrium, linearise, linearise_orbit
 from analysis.mechanisms import register
-from analysis.periodic import (
-    Drive,
-    Family,
-    basins,
-    coexistence,
-    find_orbit,
-    find_orbits,
-    motion_gradient,
-    natural_frequency,
-    newton_orbit,
-    plane,
-    stability_chart,
-    steady_drive,
-    sweep,
-    with_values,
-)
 from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
 from analysis.studio.tables import mechanism_tables
@@ -68,8 +53,10 @@ def _registered() -> None:
     register(MECHANISM)
 
 
-def _drive(speed: float, ratio: Fraction, phase: float = 0.0) -> Drive:
-    return Drive(speeds={"left.speed": speed, "right.speed": float(ratio) * speed}, held={"right.angle": phase})
+def _drive(speed: float, ratio: Fraction, phase: float = 0.0) -> periodic.Drive:
+    return periodic.Drive(
+        speeds={"left.speed": speed, "right.speed": float(ratio) * speed}, held={"right.angle": phase}
+    )
 
 
 def _cart(speeds: tuple[float, ...], phases: tuple[float, ...], t: Any) -> Any:
@@ -84,7 +71,7 @@ def _cart(speeds: tuple[float, ...], phases: tuple[float, ...], t: Any) -> Any:
 @pytest.mark.parametrize("ratio", RATIOS, ids=str)
 def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> None:
     speed, phase = 21.0, 0.4
-    orbit = newton_orbit(P, _drive(speed, ratio, phase))
+    orbit = periodic.newton_orbit(P, _drive(speed, ratio, phase))
     turns = ratio.denominator
     assert orbit.flow.period == pytest.approx(2.0 * pi * turns)
     turn = orbit.turn(256)
@@ -94,18 +81,16 @@ def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> N
     np.testing.assert_allclose(turn["right.angle"], phase + float(ratio) * turn["left.angle"], atol=1e-12)
     # the multipliers are those of the free oscillator over the common period
     roots = np.roots([K.mass, K.c, K.k])
-    np.testing.assert_allclose(
-        np.sort_complex(orbit.multipliers), np.sort_complex(np.exp(roots * turn.period)), rtol=1e-8
-    )
+    right = np.exp(roots * turn.period)
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), np.sort_complex(right), rtol=1e-8)
     assert orbit.determinant_by_liouville() == pytest.approx(np.exp(-K.c / K.mass * turn.period), rel=1e-8)
 
 
 def test_the_search_for_a_motion_begins_with_the_other_crank_at_its_ratio() -> None:
     # on its motor the right rotor turns freely, one and a half times for each turn of the left one
     motor = InductionMotor(breakdown_torque=0.2, breakdown_slip=0.2, synchronous_speed=61.0)
-    drive = Drive(
-        speed=40.0, crank="left.speed", ratios={"right.speed": Fraction(3, 2)}, motors={"right.torque": motor}
-    )
+    ratios, motors = {"right.speed": Fraction(3, 2)}, {"right.torque": motor}
+    drive = periodic.Drive(speed=40.0, crank="left.speed", ratios=ratios, motors=motors)
     flow = drive.flow(MECHANISM)
     guess = first_guess(flow, drive, None)
     assert dict(zip((name for name, _ in flow.components), guess))["right.speed_out"] == pytest.approx(60.0)
@@ -121,9 +106,9 @@ def test_a_run_settles_on_it_and_the_balance_closes() -> None:
 
 
 def test_what_varies_by_default_is_the_speed_of_the_crank_of_the_drive() -> None:
-    drive = Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1})
-    assert Family(parameters=P, drive=drive).vary == "right.speed"
-    assert Family(parameters=P, drive=_drive(20.0, Fraction(1))).vary == "left.speed"
+    drive = periodic.Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1})
+    assert periodic.Family(parameters=P, drive=drive).vary == "right.speed"
+    assert periodic.Family(parameters=P, drive=_drive(20.0, Fraction(1))).vary == "left.speed"
 
 
 def test_linear_models_along_a_motion_go_through_the_common_period_of_both_cranks() -> None:
@@ -133,8 +118,8 @@ def test_linear_models_along_a_motion_go_through_the_common_period_of_both_crank
     wanted = _cart((speed, 30.0), (0.0, 0.0), np.arange(64) * period / 64)
     place = [f.coordinate for f in MECHANISM.freedoms].index("cart.position")
     for orbit in (
-        newton_orbit(P, _drive(speed, ratio)),
-        newton_orbit(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
+        periodic.newton_orbit(P, _drive(speed, ratio)),
+        periodic.newton_orbit(P, periodic.Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
     ):
         model = linearise_orbit(P, orbit, samples=64)
         assert model.period == pytest.approx(period)
@@ -142,7 +127,7 @@ def test_linear_models_along_a_motion_go_through_the_common_period_of_both_crank
         angles = model.states[:, :2] - model.states[0, :2]
         np.testing.assert_allclose(angles[:, 1], 1.5 * angles[:, 0], atol=1e-9)
     with pytest.raises(InputError, match="no common period"):
-        Drive(speeds={"left.speed": speed, "right.speed": 30.0001})
+        periodic.Drive(speeds={"left.speed": speed, "right.speed": 30.0001})
 
 
 def _slope(t: float, x: np.ndarray, torque: Any) -> np.ndarray:
@@ -157,18 +142,13 @@ def _slope(t: float, x: np.ndarray, torque: Any) -> np.ndarray:
 
 def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_an_independent_monodromy() -> None:
     motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.1)
-    drive = Drive(speed=24.0, crank="left.speed", ratios={"right.angle": 1}, motors={"right.torque": motor})
-    found = simulate(
-        P,
-        Inputs(left_speed=24.0, right_torque=motor),
-        initial=MECHANISM.initial(left_speed=24.0, right_speed=24.0),
-        samples=2.0 * pi / 24.0 * np.arange(401),
-        stop_time=2.0 * pi / 24.0 * 400,
-        tolerance=1e-11,
-    )
+    drive = periodic.Drive(speed=24.0, crank="left.speed", ratios={"right.angle": 1}, motors={"right.torque": motor})
+    initial, times = MECHANISM.initial(left_speed=24.0, right_speed=24.0), 2.0 * pi / 24.0 * np.arange(401)
+    inputs = Inputs(left_speed=24.0, right_torque=motor)
+    found = simulate(P, inputs, initial=initial, samples=times, stop_time=times[-1], tolerance=1e-11)
     last = [found[name][-1] for name in ("right.angle", "cart.position", "right.speed_out", "cart.velocity")]
     last[0] -= 400 * 2.0 * pi
-    orbit = newton_orbit(P, drive, start=last)
+    orbit = periodic.newton_orbit(P, drive, start=last)
     assert orbit.flow.components[0][0] == "right.angle"
 
     def torque(w: float) -> float:
@@ -177,21 +157,19 @@ def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_a
 
     def turned(y: np.ndarray) -> np.ndarray:
         th2, s, w2, v = y
-        state = scipy.integrate.solve_ivp(
-            _slope, (0.0, 2.0 * pi / 24.0), [0.0, th2, s, 24.0, w2, v], "DOP853", rtol=1e-12, atol=1e-13, args=(torque,)
-        ).y[:, -1]
+        tight, start = {"rtol": 1e-12, "atol": 1e-13, "args": (torque,)}, [0.0, th2, s, 24.0, w2, v]
+        state = scipy.integrate.solve_ivp(_slope, (0.0, 2.0 * pi / 24.0), start, "DOP853", **tight).y[:, -1]
         return np.array([state[1] - 2.0 * pi, state[2], state[4], state[5]])
 
     np.testing.assert_allclose(turned(orbit.start), orbit.start, rtol=1e-8, atol=1e-9)
     step = 1e-5
     columns = [(turned(orbit.start + step * e) - turned(orbit.start - step * e)) / (2.0 * step) for e in np.eye(4)]
-    np.testing.assert_allclose(
-        np.sort_complex(np.linalg.eigvals(np.column_stack(columns))), np.sort_complex(orbit.multipliers), atol=1e-6
-    )
+    ours, right = np.linalg.eigvals(np.column_stack(columns)), np.sort_complex(orbit.multipliers)
+    np.testing.assert_allclose(np.sort_complex(ours), right, atol=1e-6)
     response = frequency_response(P, 23.95, 24.05, drive=drive, vary="left.speed", start=orbit.start, doublings=0)
     assert not response.problems
     at = min(response.branches[0].orbits, key=lambda point: abs(point.drive.speed - 24.0))
-    again = newton_orbit(P, at.drive, start=at.start, settle=False)
+    again = periodic.newton_orbit(P, at.drive, start=at.start, settle=False)
     np.testing.assert_allclose(again.start, at.start, rtol=1e-6, atol=1e-7)
 
 
@@ -202,7 +180,7 @@ def test_rotors_on_motors_have_the_ratio_of_their_first_speeds_and_are_held_for_
     motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.1)
     initial = MECHANISM.initial(left_speed=20.0, right_speed=right)
     for inputs in (Inputs(left_torque=motor, right_torque=motor), Inputs(left_speed=20.0, right_torque=motor)):
-        assert steady_drive(P, inputs, initial).ratios == {"right.angle": ratio}
+        assert periodic.steady_drive(P, inputs, initial).ratios == {"right.angle": ratio}
         modes = natural_modes(P, inputs, initial=initial)
         assert modes.coordinates == ("cart.position",)
         np.testing.assert_allclose(modes.frequencies, sqrt(K.k / K.mass), rtol=1e-3)
@@ -214,18 +192,18 @@ def test_rotors_on_motors_have_the_ratio_of_their_first_speeds_and_are_held_for_
 
 def test_a_motor_is_reversed_by_two_of_its_numbers() -> None:
     motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.0)
-    drive = Drive(speed=24.0, crank="left.speed", ratios={"right.angle": -1}, motors={"right.torque": motor})
+    drive = periodic.Drive(speed=24.0, crank="left.speed", ratios={"right.angle": -1}, motors={"right.torque": motor})
     back = {"right.torque.breakdown_torque": -0.05, "right.torque.synchronous_speed": -24.0}
-    assert with_values(P, drive, back)[1].motors["right.torque"].synchronous_speed == -24.0
+    assert periodic.with_values(P, drive, back)[1].motors["right.torque"].synchronous_speed == -24.0
 
 
 def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:
     with pytest.raises(InputError, match=r"left\.speed.*right\.speed"):
-        Drive(speeds={"left.speed": 20.0, "right.speed": 20.0 * sqrt(2.0)})
+        periodic.Drive(speeds={"left.speed": 20.0, "right.speed": 20.0 * sqrt(2.0)})
     with pytest.raises(InputError, match=r"left\.angle, right\.angle"):
-        newton_orbit(P, Drive(speed=20.0))
+        periodic.newton_orbit(P, periodic.Drive(speed=20.0))
     with pytest.raises(InputError, match=r"right\.angle"):
-        newton_orbit(P, Drive(speed=20.0, crank="left.speed", forces={"right.torque": 0.01}))
+        periodic.newton_orbit(P, periodic.Drive(speed=20.0, crank="left.speed", forces={"right.torque": 0.01}))
 
 
 @pytest.mark.parametrize("ratio", [Fraction(1), Fraction(2), Fraction(3, 2)], ids=str)
@@ -236,18 +214,16 @@ def test_the_response_scales_all_commanded_speeds_together(ratio: Fraction) -> N
         t = np.linspace(0.0, 2.0 * pi * ratio.denominator / speed, 4001)
         wanted = _cart((speed, float(ratio) * speed), (0.0, 0.0), t)
         assert orbit.amplitude == pytest.approx(0.5 * np.ptp(wanted), rel=1e-5)
-    over_right = frequency_response(
-        P, 18.0 * float(ratio), 32.0 * float(ratio), drive=_drive(20.0, ratio), vary="right.speed"
-    )
+    low, high = 18.0 * float(ratio), 32.0 * float(ratio)
+    over_right = frequency_response(P, low, high, drive=_drive(20.0, ratio), vary="right.speed")
     tops, others = response.maxima(), over_right.maxima()
     assert [top.amplitude for top in tops] == pytest.approx([top.amplitude for top in others], rel=1e-6)
-    assert natural_frequency(P) == pytest.approx(sqrt(K.k / K.mass), rel=0.02)
+    assert periodic.natural_frequency(P) == pytest.approx(sqrt(K.k / K.mass), rel=0.02)
 
 
 def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
-    chart = stability_chart(
-        P, _drive(20.0, Fraction(3, 2)), ("left.speed", "cart.damping"), ranges=((18.0, 30.0), (5.0, 20.0)), points=5
-    )
+    ranges = {"ranges": ((18.0, 30.0), (5.0, 20.0)), "points": 5}
+    chart = periodic.stability_chart(P, _drive(20.0, Fraction(3, 2)), ("left.speed", "cart.damping"), **ranges)
     for row, damping in enumerate(chart.grid.y):
         for column, speed in enumerate(chart.grid.x):
             wanted = np.exp(-0.5 * damping / K.mass * 4.0 * pi / speed)
@@ -258,24 +234,23 @@ def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
 def test_every_search_finds_the_one_motion_there_is() -> None:
     ratio, turns = Fraction(3, 2), 2
     inputs = Inputs(left_speed=20.0, right_speed=30.0)
-    met, (known,) = find_orbit(P, inputs), find_orbits(P, inputs).orbits
+    met, (known,) = periodic.find_orbit(P, inputs), periodic.find_orbits(P, inputs).orbits
     for orbit in (met, known):
         turn = orbit.turn(256)
         wanted = _cart((20.0, 30.0), (0.0, 0.0), turn.time)
         np.testing.assert_allclose(turn["cart.position"], wanted, atol=1e-8 * np.abs(wanted).max())
     speeds = np.array([18.0, 19.0, 20.0])
     times = 2.0 * pi * turns / speeds[:, None] * np.linspace(0.0, 1.0, 100_001)
-    swings = [
-        0.5 * np.ptp(_cart((w, float(ratio) * w), (0.0, 0.0), t)) for w, t in zip(speeds.tolist(), times, strict=True)
-    ]
-    up = sweep(P, speeds, drive=_drive(18.0, ratio))
+    pairs = [(w, float(ratio) * w) for w in speeds.tolist()]
+    swings = [0.5 * np.ptp(_cart(pair, (0.0, 0.0), t)) for pair, t in zip(pairs, times, strict=True)]
+    up = periodic.sweep(P, speeds, drive=_drive(18.0, ratio))
     assert [orbit.amplitude for orbit in up.orbits if orbit] == pytest.approx(swings, rel=1e-6)
-    operation = plane(P, _drive(20.0, ratio), "left.speed", "cart.damping")
-    found = coexistence(operation, speeds, [1.0, 2.0])
+    operation = periodic.plane(P, _drive(20.0, ratio), "left.speed", "cart.damping")
+    found = periodic.coexistence(operation, speeds, [1.0, 2.0])
     assert found.count.tolist() == [[1, 1, 1], [1, 1, 1]]
     decay = np.exp(-np.array([[1.0], [2.0]]) * pi * turns / (speeds * K.mass))
     np.testing.assert_allclose(found.largest[:, :, 0], decay, rtol=1e-6)
-    all_of_it = basins(P, _drive(20.0, ratio), points=10)
+    all_of_it = periodic.basins(P, _drive(20.0, ratio), points=10)
     assert [orbit.amplitude for orbit in all_of_it.motions] == pytest.approx(swings[2:], rel=1e-6)
     assert (all_of_it.ends == 0).all()
 
@@ -284,17 +259,16 @@ def test_a_common_period_of_many_turns_has_as_many_samples_in_each() -> None:
     """In 256 and in 64 samples of eleven turns the greatest values lie up to a hundredth lower."""
     speeds, drive = (20.0, 20.0 * 13 / 11), _drive(20.0, Fraction(13, 11))
     wanted = _cart(speeds, (0.0, 0.0), np.linspace(0.0, 22.0 * pi / 20.0, 100_001))
-    turn = newton_orbit(P, drive).turn()
-    assert [turn["cart.position"].max(), turn["cart.position"].min()] == pytest.approx(
-        [wanted.max(), wanted.min()], rel=3e-4
-    )
-    found = coexistence(plane(P, drive, "left.speed", "cart.damping"), [20.0], [P.cart_damping])
+    turn = periodic.newton_orbit(P, drive).turn()
+    swing = turn["cart.position"].max(), turn["cart.position"].min()
+    assert swing == pytest.approx((wanted.max(), wanted.min()), rel=3e-4)
+    found = periodic.coexistence(periodic.plane(P, drive, "left.speed", "cart.damping"), [20.0], [P.cart_damping])
     assert found.amplitude[0, 0, 0] == pytest.approx(0.5 * np.ptp(wanted), rel=1e-4)
 
 
 def test_the_motion_changes_with_the_parameters_of_the_cart_and_of_both_rotors_as_its_closed_form_does() -> None:
     speeds, unbalances = np.array([20.0, 30.0]), np.array([K.unbalance1, K.unbalance2])
-    motion = motion_gradient(newton_orbit(P, _drive(20.0, Fraction(3, 2))))
+    motion = periodic.motion_gradient(periodic.newton_orbit(P, _drive(20.0, Fraction(3, 2))))
     stiff = K.k - K.mass * speeds**2 + 1j * K.c * speeds
     parts = unbalances * speeds**2 / stiff
     expected = {
@@ -322,15 +296,8 @@ def test_the_linear_model_has_the_poles_of_the_cart() -> None:
 @pytest.mark.parametrize("ratio", [Fraction(2), Fraction(3, 2)], ids=str)
 def test_tuning_clears_the_range_of_the_resonance(ratio: Fraction) -> None:
     natural = sqrt(K.k / K.mass)
-    wish = Wish(
-        parameters=P,
-        drive=_drive(10.0, ratio),
-        over="left.speed",
-        between=(0.97 * natural, 1.03 * natural),
-        change={"cart.stiffness": "60 %"},
-        no_resonance=True,
-    )
-    tuned = tune(wish)
+    asked = {"over": "left.speed", "between": (0.97 * natural, 1.03 * natural), "no_resonance": True}
+    tuned = tune(Wish(parameters=P, drive=_drive(10.0, ratio), change={"cart.stiffness": "60 %"}, **asked))
     assert tuned.met
     moved = sqrt(tuned.parameters.cart_stiffness / K.mass)
     assert not 0.97 * natural < moved < 1.03 * natural
@@ -362,10 +329,8 @@ def test_a_case_file_an_ensemble_and_the_command_line(linkwork: Callable[..., Re
 def test_the_fmus_run_as_the_solver_does(tmp_path: Path) -> None:
     inputs = Inputs(left_speed=steps([0.0, 0.1], [10.0, 14.0]), right_torque=0.02)
     run = simulate(P, inputs, initial=DEMO.initial, stop_time=0.2, step=1e-3, tolerance=1e-11)
-    for file in (
-        build(MECHANISM, tmp_path),
-        *(build_native(MECHANISM, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3)),
-    ):
+    native = [build_native(MECHANISM, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3)]
+    for file in (build(MECHANISM, tmp_path), *native):
         other = cosimulate(file, P, inputs, initial=DEMO.initial, stop_time=0.2, step=1e-3, tolerance=1e-11)
         assert compare(run, other).worst.relative < 1e-8, file.name
 
@@ -374,7 +339,7 @@ def test_the_studio_and_the_pictures_show_both_rotors() -> None:
     tables = mechanism_tables(MECHANISM)
     starts = {row["name"]: row["start"] for row in tables["given"]}
     assert (starts["left.speed"], starts["right.speed"]) == (20.0, 30.0)
-    figures.plot(newton_orbit(P, _drive(20.0, Fraction(2))))
+    figures.plot(periodic.newton_orbit(P, _drive(20.0, Fraction(2))))
     figures.plot(frequency_response(P, 18.0, 32.0, drive=_drive(20.0, Fraction(2)), vary="left.speed"))
 
 

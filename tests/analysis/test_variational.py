@@ -20,12 +20,8 @@ FloatArray = NDArray[np.float64]
 
 # Youssef, chapter VI: the printed linkages, cm and deg. Path b with l4 = 184.443 (printed 183.443)
 WEIGHTED_ROCKER = Linkage(
-    ground_length=0.1565,
-    crank_length=0.0691,
-    coupler_length=0.1177,
-    rocker_length=0.1156,
-    crank_phase=np.radians(42.74),
-)
+    ground_length=0.1565, crank_length=0.0691, coupler_length=0.1177, rocker_length=0.1156, crank_phase=np.radians(42.74),
+)  # fmt: skip
 PATH_B = Linkage(
     pivot_x=-0.4913, pivot_y=1.4498, ground_length=1.42576, crank_length=0.0818, coupler_length=1.52743,
     rocker_length=1.84443, point_distance=1.4738, ground_angle=np.radians(-3.062),
@@ -67,9 +63,8 @@ def plant_error(
     if target.ndim == 1:
         return np.abs(wrapped(np.arctan2(g[3], g[2]) + linkage.output_angle - target))
     turn = np.exp(1j * linkage.ground_angle)
-    pin = complex(linkage.pivot_x, linkage.pivot_y) + turn * linkage.crank_length * np.exp(
-        1j * (phi + linkage.crank_phase)
-    )
+    crank = linkage.crank_length * np.exp(1j * (phi + linkage.crank_phase))
+    pin = complex(linkage.pivot_x, linkage.pivot_y) + turn * crank
     point = pin + turn * linkage.point_distance * np.exp(1j * linkage.point_angle) * (g[0] + 1j * g[1])
     return np.abs(point - target[:, 0] - 1j * target[:, 1])
 
@@ -116,20 +111,12 @@ def brute_force(
 
 def random_linkage(random: np.random.Generator) -> Linkage:
     """Any linkage; seldom one that turns with a fixed pivot."""
-    return Linkage(
-        pivot_x=random.uniform(-1.0, 1.0),
-        pivot_y=random.uniform(-1.0, 1.0),
-        ground_length=random.uniform(0.5, 1.5),
-        crank_length=random.uniform(0.1, 0.8),
-        coupler_length=random.uniform(0.6, 1.5),
-        rocker_length=random.uniform(0.6, 1.5),
-        point_distance=random.uniform(0.1, 1.5),
-        ground_angle=random.uniform(-pi, pi),
-        crank_phase=random.uniform(-pi, pi),
-        point_angle=random.uniform(-pi, pi),
-        output_angle=random.uniform(-pi, pi),
-        branch=int(random.choice([1, -1])),
-    )
+    ranges = dict.fromkeys(("pivot_x", "pivot_y"), (-1.0, 1.0))
+    ranges |= {"ground_length": (0.5, 1.5), "crank_length": (0.1, 0.8)}
+    ranges |= {"coupler_length": (0.6, 1.5), "rocker_length": (0.6, 1.5), "point_distance": (0.1, 1.5)}
+    ranges |= dict.fromkeys(("ground_angle", "crank_phase", "point_angle", "output_angle"), (-pi, pi))
+    values = {name: random.uniform(*ends) for name, ends in ranges.items()}
+    return Linkage(**values, branch=int(random.choice([1, -1])))
 
 
 def random_task(random: np.random.Generator, phi: FloatArray, path: bool) -> FloatArray:
@@ -216,12 +203,8 @@ class TestGeometry:
             np.testing.assert_allclose(np.abs(loop), 0.0, atol=1e-14)
             for k in np.flatnonzero(np.abs(sine) > 1e-2):
                 # the linkage with its slider held there
-                series = FourierSeries.constant(motion.u[k])
-                held = replace(
-                    linkage,
-                    pivot=SliderMotion(series=series, guide_angle=motion.guide_angle),
-                    branch=int(motion.branch[k]),
-                )
+                pivot = SliderMotion(series=FourierSeries.constant(motion.u[k]), guide_angle=motion.guide_angle)
+                held = replace(linkage, pivot=pivot, branch=int(motion.branch[k]))
                 at = phi[k : k + 1]
                 if path:
                     error = np.hypot(*(held.path(at) - target[k])[0])
@@ -240,10 +223,8 @@ class TestGeometry:
             kind = motion.kind
             if path:
                 turned = motion.coupler_angle + linkage.ground_angle
-                pin = complex(linkage.pivot_x, linkage.pivot_y) + linkage.crank_length * np.exp(
-                    1j * (phi + linkage.crank_phase + linkage.ground_angle)
-                )
-                aim = target[:, 0] + 1j * target[:, 1] - pin
+                crank = linkage.crank_length * np.exp(1j * (phi + linkage.crank_phase + linkage.ground_angle))
+                aim = target[:, 0] + 1j * target[:, 1] - complex(linkage.pivot_x, linkage.pivot_y) - crank
                 # the coupler points at the target: what is left is the difference of the distances from B
                 left = np.abs(np.abs(aim) - linkage.point_distance)
                 off, other = np.angle(aim * np.exp(-1j * (turned + linkage.point_angle))), motion.rocker_angle
@@ -312,9 +293,8 @@ class TestKnownMotions:
 
     def test_links_of_one_length_with_the_crank_pin_on_the_slider_pin(self) -> None:
         # at phi = 0 the crank lies along the guide, and B can be on D
-        linkage = Linkage(
-            ground_length=0.1535, crank_length=0.05, coupler_length=0.15, rocker_length=0.15, point_distance=0.1
-        )
+        links = {"ground_length": 0.1535, "crank_length": 0.05, "coupler_length": 0.15, "rocker_length": 0.15}
+        linkage = Linkage(**links, point_distance=0.1)
         target = np.column_stack([0.05 + 0.12 * np.cos(TURN_24 + 0.3), 0.12 * np.sin(TURN_24 + 0.3)])
         motion = variational_motion(linkage, TURN_24, target)
         brute = brute_force(linkage, TURN_24[1:12], target[1:12], 0.0, (-inf, inf), 0.0, 1)
@@ -332,9 +312,8 @@ def sampled_gap(linkage: Linkage, motion: VariationalMotion, target: FloatArray,
     start = motion.rotation[k]
     step = (motion.rotation[following] - start) % (2.0 * pi)
     aim = target[k] + np.multiply.outer(share, target[following] - target[k])
-    fine = variational_motion(
-        linkage, start + share * step, aim, guide_angle=motion.guide_angle, least_transmission=0.2, closed=False
-    )
+    settings = {"guide_angle": motion.guide_angle, "least_transmission": 0.2, "closed": False}
+    fine = variational_motion(linkage, start + share * step, aim, **settings)
     same = np.allclose(fine.u[[0, -1]], motion.u[[k, following]], rtol=0.0, atol=1e-9)
     return float(np.abs(np.diff(fine.u)).max()) if same else nan
 
@@ -444,9 +423,8 @@ class TestThesis:
         # the printed linkage without a slider: 35.8 at N = 24, re-evaluated
         alone = float(weights @ wrapped(WEIGHTED_ROCKER.rocker_angle(TURN_24) - target) ** 2)
         assert alone == pytest.approx(35.8, abs=0.2)
-        motion = variational_motion(
-            WEIGHTED_ROCKER, TURN_24, target, guide_angle=pi / 6.0, weights=weights, continuous=continuous
-        )
+        settings = {"guide_angle": pi / 6.0, "weights": weights, "continuous": continuous}
+        motion = variational_motion(WEIGHTED_ROCKER, TURN_24, target, **settings)
         assert motion.error.max() < 1e-14
         assert len(motion.jumps) == 0
         # the thesis states 4.8 for two harmonics; a direct search reaches 0.72. The fit is where such a search starts
@@ -458,10 +436,8 @@ class TestThesis:
     def test_path_b_is_missed_by_the_length_of_the_coupler_arm_alone(self, guide_angle: float) -> None:
         motion = variational_motion(PATH_B, TURN_72, ELLIPSE_B, guide_angle=guide_angle)
         angle = TURN_72 + PATH_B.crank_phase + PATH_B.ground_angle
-        from_b = np.hypot(
-            ELLIPSE_B[:, 0] - PATH_B.pivot_x - PATH_B.crank_length * np.cos(angle),
-            ELLIPSE_B[:, 1] - PATH_B.pivot_y - PATH_B.crank_length * np.sin(angle),
-        )
+        crank = PATH_B.crank_length * np.column_stack([np.cos(angle), np.sin(angle)])
+        from_b = np.hypot(*(ELLIPSE_B - [PATH_B.pivot_x, PATH_B.pivot_y] - crank).T)
         np.testing.assert_allclose(motion.error, np.abs(from_b - PATH_B.point_distance), atol=1e-14)
         assert len(motion.jumps) == 0
         # three harmonics all but reach it
@@ -471,25 +447,21 @@ class TestThesis:
 
 
 class TestRefusals:
+    LINKAGE = Linkage(ground_length=3.0, crank_length=0.5, coupler_length=1.0, rocker_length=0.7, point_distance=1.0)
+
     def test_a_guide_out_of_reach(self) -> None:
-        linkage = Linkage(
-            ground_length=3.0, crank_length=0.5, coupler_length=1.0, rocker_length=0.7, point_distance=1.0
-        )
         # with the guide across the ground link the crank pin is 3.5 m from it at phi = pi, and the links span 1.7 m
         phi = np.array([0.0, 0.5 * pi, pi])
         with pytest.raises(AssemblyError, match=r"3 of 3 rotations: at 3.14159 rad .* 3.5 m, .* 1.8 m"):
-            variational_motion(linkage, phi, np.zeros((3, 2)), guide_angle=0.5 * pi)
+            variational_motion(self.LINKAGE, phi, np.zeros((3, 2)), guide_angle=0.5 * pi)
 
     def test_a_stroke_out_of_reach(self) -> None:
-        linkage = Linkage(
-            ground_length=3.0, crank_length=0.5, coupler_length=1.0, rocker_length=0.7, point_distance=1.0
-        )
         # at phi = 0 BD is 2.5 m + u, and has to be from 0.3 to 1.7 m; at phi = pi it is 3.5 m + u
         with pytest.raises(AssemblyError, match=r"2 of 2 .* 3.14159 rad .* -3.2 to -1.8 m.* 1.3 m"):
-            variational_motion(linkage, [0.0, pi], np.zeros((2, 2)), stroke=(-0.5, 1.0))
+            variational_motion(self.LINKAGE, [0.0, pi], np.zeros((2, 2)), stroke=(-0.5, 1.0))
         # too near
         with pytest.raises(AssemblyError, match=r"1 of 1 .* -2.2 to -0.8 m.* 0.1 m"):
-            variational_motion(linkage, [0.0], [1.0], stroke=(-2.7, -2.3))
+            variational_motion(self.LINKAGE, [0.0], [1.0], stroke=(-2.7, -2.3))
 
     @pytest.mark.parametrize(
         ("rotation", "target", "more", "says"),

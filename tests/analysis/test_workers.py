@@ -287,10 +287,8 @@ def timed_path(_: Path) -> list[Any]:
 
 def least_area(_: Path) -> list[Any]:
     task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24)
-    return [
-        list(s.linkage.values().values())
-        for s in synthesize(task, search=Search(starts=12, candidates=1 << 12)).solutions
-    ]
+    search = Search(starts=12, candidates=1 << 12)
+    return [list(s.linkage.values().values()) for s in synthesize(task, search=search).solutions]
 
 
 def samples(_: Path) -> list[Any]:
