@@ -31,13 +31,8 @@ _libc.free.argtypes = [c_void_p]
 
 
 class _Callbacks(ctypes.Structure):
-    _fields_ = (
-        ("logger", _LOGGER),
-        ("allocateMemory", _ALLOCATE),
-        ("freeMemory", _FREE),
-        ("stepFinished", _STEP_FINISHED),
-        ("componentEnvironment", c_void_p),
-    )
+    _NAMES = ("logger", "allocateMemory", "freeMemory", "stepFinished", "componentEnvironment")
+    _fields_ = tuple(zip(_NAMES, (_LOGGER, _ALLOCATE, _FREE, _STEP_FINISHED, c_void_p)))
 
 
 class Variable:
@@ -77,20 +72,12 @@ class Instance:
         self.fmu = fmu
         self.log = []
         # the references keep the callbacks alive as long as the instance may call them
-        self._callbacks = _Callbacks(
-            _LOGGER(self._logged), _ALLOCATE(_libc.calloc), _FREE(_libc.free), _STEP_FINISHED(), None
-        )
+        functions = (_LOGGER(self._logged), _ALLOCATE(_libc.calloc), _FREE(_libc.free), _STEP_FINISHED())
+        self._callbacks = _Callbacks(*functions, None)
         create = fmu.library.fmi2Instantiate
         create.restype = c_void_p
-        component = create(
-            name.encode(),
-            c_int(CO_SIMULATION),
-            guid.encode(),
-            resources.encode(),
-            byref(self._callbacks),
-            c_int(0),
-            c_int(logging),
-        )
+        given = (name.encode(), c_int(CO_SIMULATION), guid.encode(), resources.encode())
+        component = create(*given, byref(self._callbacks), c_int(0), c_int(logging))
         if not component:
             raise RuntimeError(f"not instantiated: {self.log}")
         self.component = c_void_p(component)
@@ -107,14 +94,8 @@ class Instance:
     # Lifecycle
 
     def setup(self, start=0.0, stop=None, tolerance=None):
-        return self._call(
-            "SetupExperiment",
-            c_int(tolerance is not None),
-            c_double(tolerance or 0.0),
-            c_double(start),
-            c_int(stop is not None),
-            c_double(stop or 0.0),
-        )
+        bounded = (c_int(tolerance is not None), c_double(tolerance or 0.0))
+        return self._call("SetupExperiment", *bounded, c_double(start), c_int(stop is not None), c_double(stop or 0.0))
 
     def enter(self):
         return self._call("EnterInitializationMode")
@@ -140,6 +121,14 @@ class Instance:
                 raise RuntimeError(f"step of {size} s refused at t = {time} s: {self.log}")
             time += size
         return time
+
+    def rows(self, sizes, time=0.0):
+        """Return the outputs before steps of the given sizes from ``time``, and after each of them."""
+        found = [self.outputs()]
+        for size in sizes:
+            time = self.run([size], time)
+            found.append(self.outputs())
+        return found
 
     def terminate(self):
         return self._call("Terminate")
@@ -213,10 +202,8 @@ class Instance:
 
     def deserialize(self, data):
         state = c_void_p()
-        status = self._call(
-            "DeSerializeFMUstate", (c_char * len(data)).from_buffer_copy(data), c_size_t(len(data)), byref(state)
-        )
-        return status, state
+        copied = (c_char * len(data)).from_buffer_copy(data)
+        return self._call("DeSerializeFMUstate", copied, c_size_t(len(data)), byref(state)), state
 
     # Status of the last step
 

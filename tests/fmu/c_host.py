@@ -144,15 +144,9 @@ def run_host(
     arguments = [fmu.library, fmu.fmi, interface, fmu.token, resources, fmu.states, steps, step, instances, threads]
     with tempfile.TemporaryDirectory(prefix="linkwork-host-") as folder:
         done = subprocess.run(
-            [*emulator, str(host), *map(str, arguments)],
-            input="\n".join(plan),
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-            env=os.environ | (environment or {}),
-            cwd=folder,
-        )
+            [*emulator, str(host), *map(str, arguments)], input="\n".join(plan), capture_output=True, text=True,
+            timeout=300, check=False, env=os.environ | (environment or {}), cwd=folder,
+        )  # fmt: skip
     if done.returncode != 0:
         raise RuntimeError(f"the host ended with {done.returncode}: {done.stderr}")
     found: dict[str, Any] = json.loads(done.stdout)

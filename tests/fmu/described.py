@@ -33,10 +33,8 @@ def read_scalars(xml: bytes | Element) -> list[Scalar]:
             kind, attributes = node[0].tag, node.attrib | node[0].attrib
         else:
             start = node.find("Start")
-            kind, attributes = (
-                _TYPES.get(node.tag, node.tag),
-                node.attrib | ({} if start is None else {"start": start.get("value")}),
-            )
+            kind, given = _TYPES.get(node.tag, node.tag), {} if start is None else {"start": start.get("value")}
+            attributes = node.attrib | given
         found.append(Scalar(node.get("name"), int(node.get("valueReference")), kind, attributes))
     return found
 

@@ -24,10 +24,8 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     after = [later if name == changed else reals.get(name, 0.0) for name in names]
     # the jump is exactly at a communication point: at a rounded time it would cause a step of its own
     half = 50 * 1e-3
-    signals = np.array(
-        [(0.0, *before), (half, *before), (half, *after), (0.1, *after)],
-        dtype=[("time", float), *((name, float) for name in names)],
-    )
+    rows = [(0.0, *before), (half, *before), (half, *after), (0.1, *after)]
+    signals = np.array(rows, dtype=[("time", float), *((name, float) for name in names)])
     said: list[str] = []
     try:
         result = simulate_fmu(
@@ -46,12 +44,9 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
         )
     except FMICallException as error:
         return {"said": [*said, str(error)]}
-    return {
-        "end": {name: float(result[-1][name]) for name in outputs},
-        "time": float(result[-1]["time"]),
-        "status": int(result[-1]["solver.status"]),
-        "said": said,
-    }
+    last = result[-1]
+    told = {"status": int(last["solver.status"]), "said": said}
+    return {"end": {name: float(last[name]) for name in outputs}, "time": float(last["time"])} | told
 
 
 def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> Any:
@@ -72,29 +67,18 @@ def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> 
 
     description = read_model_description(fmu)
     ramp = np.array([(0.0, reals[changed]), (0.1, later)], dtype=[("time", float), (changed, float)])
-    options: dict[str, Any] = {
-        "stop_time": 0.1,
-        "step_size": 1e-3,
-        "output_interval": 1e-3,
-        "output": outputs,
-        "input": ramp,
-    }
+    options: dict[str, Any] = {"stop_time": 0.1, "step_size": 1e-3, "output_interval": 1e-3}
+    options |= {"output": outputs, "input": ramp}
     if option == "fmu_state":
         made = instantiate_fmu(extract(fmu), description, "CoSimulation")
-        half = options | {
-            "stop_time": 0.05,
-            "set_stop_time": False,
-            "terminate": False,
-            "start_values": reals | integers,
-        }
-        simulate_fmu(fmu, fmu_instance=made, **half)
+        half = options | {"stop_time": 0.05, "set_stop_time": False, "terminate": False}
+        simulate_fmu(fmu, fmu_instance=made, start_values=reals | integers, **half)
         options |= {"start_time": 0.05, "initialize": False, "fmu_instance": made, "fmu_state": made.getFMUState()}
     else:
         options |= {"start_values": reals | integers, option: True}
     if option == "early_return_allowed":
-        options["fmu_instance"] = instantiate_fmu(
-            extract(fmu), description, "CoSimulation", early_return_allowed=True, intermediate_update=update
-        )
+        early = {"early_return_allowed": True, "intermediate_update": update}
+        options["fmu_instance"] = instantiate_fmu(extract(fmu), description, "CoSimulation", **early)
     run = simulate_fmu(fmu, model_description=description, **options)
     return {"end": {name: float(run[-1][name]) for name in outputs}, "time": float(run[-1]["time"])}
 

@@ -25,13 +25,7 @@ UPDATE = ctypes.CFUNCTYPE(
 class Callbacks(ctypes.Structure):
     """The structure ``fmi2CallbackFunctions``; log messages come as the argument of the format ``%s``."""
 
-    _fields_ = (
-        ("logger", LOG_2),
-        ("allocate", c_void_p),
-        ("free", c_void_p),
-        ("step_finished", c_void_p),
-        ("environment", c_void_p),
-    )
+    _fields_ = (("logger", LOG_2), *((name, c_void_p) for name in ("allocate", "free", "step_finished", "environment")))
 
 
 class Memory:
@@ -51,10 +45,8 @@ class Memory:
             self.given[ctypes.addressof(block)] = block
             return ctypes.addressof(block)
 
-        self._kept = (
-            ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)(allocate),
-            ctypes.CFUNCTYPE(None, c_void_p)(lambda address: self.given.pop(address) and None),
-        )
+        block, release = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t), ctypes.CFUNCTYPE(None, c_void_p)
+        self._kept = (block(allocate), release(lambda address: self.given.pop(address) and None))
         self.functions = [ctypes.cast(function, c_void_p) for function in self._kept]
 
 
@@ -127,10 +119,8 @@ class Instance:
             self._callbacks = Callbacks(logger=self._logger) if callbacks else Callbacks()
             if memory is not None:
                 self._callbacks.allocate, self._callbacks.free = memory.functions
-            given = byref(self._callbacks)
-            self.handle = dll.fmi2Instantiate(
-                name, int(interface == "cs"), key, b"file:/nowhere", given, 0, int(logging)
-            )
+            given = (key, b"file:/nowhere", byref(self._callbacks), 0, int(logging))
+            self.handle = dll.fmi2Instantiate(name, int(interface == "cs"), *given)
         else:
             self._logger = LOG_3(lambda _, status, category, text: self._say(status, text))
             logger = self._logger if callbacks else None
@@ -140,10 +130,8 @@ class Instance:
             if interface == "me":
                 self.handle = dll.fmi3InstantiateModelExchange(*head, None, logger)
             else:
-                flags = (ctypes.c_bool(event_mode), ctypes.c_bool(early))
-                self.handle = dll.fmi3InstantiateCoSimulation(
-                    *head, *flags, None, c_size_t(0), None, logger, self._update
-                )
+                flags = (ctypes.c_bool(event_mode), ctypes.c_bool(early), None, c_size_t(0))
+                self.handle = dll.fmi3InstantiateCoSimulation(*head, *flags, None, logger, self._update)
 
     def _say(self, status: int, text: bytes, form: bytes = b"%s") -> None:
         assert form == b"%s"
@@ -182,14 +170,9 @@ class Instance:
             if isinstance(value, float):
                 status = max(status, self(self.real("Set"), *self.arrays([name], (c_double * 1)(value))))
             else:
-                status = max(status, self.set_integer(name, value))
+                function = "SetInteger" if self.library.fmi == 2 else "SetInt32"
+                status = max(status, self(function, *self.arrays([name], (c_int32 * 1)(value))))
         return status
-
-    def set_integer(self, name: str, value: int) -> int:
-        """Set an integer variable and return the status."""
-        if self.library.fmi == 2:
-            return self("SetInteger", *self.arrays([name], (c_int * 1)(value)))
-        return self("SetInt32", *self.arrays([name], (c_int32 * 1)(value)))
 
     def text(self, name: str = "solver.message") -> str:
         """Return the value of a string variable."""
@@ -211,10 +194,8 @@ class Instance:
     def arrays(self, names: Sequence[str], values: Any) -> tuple[Any, ...]:
         """Return the arguments of a function that gets or sets values."""
         references = (c_uint32 * len(names))(*(self.library.references[name] for name in names))
-        count = c_size_t(len(names))
-        return (
-            (references, count, values) if self.library.fmi == 2 else (references, count, values, c_size_t(len(values)))
-        )
+        given = (references, c_size_t(len(names)), values)
+        return given if self.library.fmi == 2 else (*given, c_size_t(len(values)))
 
     # Life
 
@@ -267,11 +248,19 @@ class Instance:
         assert self("UpdateDiscreteStates", *refs, byref(time)) == OK
         return flags[1], flags[3]
 
+    def with_state(self, verb: str, *arguments: Any) -> int:
+        """Call a function of saved states, such as "Get" for ``GetFMUState``, and return its status."""
+        return self(f"{verb}FMU{'s' if self.library.fmi == 2 else 'S'}tate", *arguments)
+
     def saved(self) -> c_void_p:
         """Return a saved FMU state."""
         state = c_void_p()
-        assert self("GetFMUstate" if self.library.fmi == 2 else "GetFMUState", byref(state)) == OK
+        assert self.with_state("Get", byref(state)) == OK
         return state
+
+    def rates(self) -> list[float]:
+        """Return the derivatives of the continuous states."""
+        return self.states("Derivatives" if self.library.fmi == 2 else "ContinuousStateDerivatives")
 
     def states(self, which: str = "ContinuousStates", count: int = 6) -> list[float]:
         """Return the continuous states, or their derivatives or nominal values."""

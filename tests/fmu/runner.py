@@ -19,6 +19,7 @@ _FRAME = """from __future__ import annotations
 import json, sys
 from pathlib import Path
 sys.path.insert(0, {helpers!r})
+from bare_master import DISCARD, ERROR, Fmu
 
 {source}
 
@@ -36,8 +37,8 @@ def run_in_process(
 ) -> Any:
     """Run the source of the function ``code`` with ``args`` in a new Python process, and return its result.
 
-    The function imports inside itself what it needs; ``bare_master`` is importable. Arguments and result are sent as JSON,
-    which represents floats without loss. If the process dies, the test fails with the output of the process.
+    The function imports inside itself what it needs, but for json, sys, Path and the master `Fmu` of ``bare_master``. Arguments
+    and result are sent as JSON, which represents floats without loss. If the process dies, the test fails with its output.
     """
     source = _FRAME.format(helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__)
     with tempfile.TemporaryDirectory(prefix="linkwork-test-") as folder:

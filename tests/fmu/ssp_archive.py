@@ -24,9 +24,8 @@ def unpack(archive: str) -> Archive:
     with zipfile.ZipFile(archive) as content:
         content.extractall("unpacked")
     system = read_ssd(archive).system
-    found = Archive(
-        {}, {}, {}, {(w.endElement, w.endConnector): (w.startElement, w.startConnector) for w in system.connections}
-    )
+    ends = {(w.endElement, w.endConnector): (w.startElement, w.startConnector) for w in system.connections}
+    found = Archive({}, {}, {}, ends)
     for part in system.elements:
         found.fmus[part.name] = fmu = str(Path("unpacked", part.source).absolute())
         parameters = read_ssv(f"unpacked/resources/{part.name}.ssv").parameters

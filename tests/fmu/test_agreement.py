@@ -73,9 +73,8 @@ def run_random(root: str, fmu: str, files: dict[str, str], seeds: list[int]) -> 
                 continue
             value = case.inputs[channel.name]
             n = source.randint(1, 3)
-            waves = [
-                [source.uniform(low, high) for _ in range(n)] for low, high in ((-0.2, 0.2), (5.0, 100.0), (0.0, 6.3))
-            ]
+            ranges = ((-0.2, 0.2), (5.0, 100.0), (0.0, 6.3))
+            waves = [[source.uniform(low, high) for _ in range(n)] for low, high in ranges]
             given[channel.argument] = (Harmonics(value, [value * a for a in waves[0]], *waves[1:]),)
             if source.random() < 0.5:
                 # on the grid of the samples, or not
@@ -185,9 +184,7 @@ def test_interfaces_that_an_fmu_has_not(natives: dict[str, Path], five_bar: Path
     with pytest.raises(InputError, match=r"no interface 'both' \(the names are co-simulation, linear-co-simulation"):
         run(natives["FiveBarSlider-native"], "both")
     found = run_in_process(without_exchange, ROOT, five_bar)
-    assert (
-        "is not a FiveBarSlider for model exchange, which these parameters need, but FiveBarSlider: it has no" in found
-    )
+    assert "is not a FiveBarSlider for model exchange, which these parameters need, but FiveBarSlider" in found
 
 
 def without_exchange(root: str, fmu: str) -> str:
@@ -225,9 +222,8 @@ def test_model_exchange_ends_at_the_limit_of_assembly(natives: dict[str, Path]) 
     options = {"stop_time": 3.0, "step": 0.01, "tolerance": 1e-11}
     within = simulate(slips, Inputs(speed=44.0), **options)
     for kind in ("native", "native-fmi3"):
-        run = cosimulate(
-            natives[f"FiveBarSlider-{kind}"], slips, Inputs(speed=44.0), interface="model-exchange", **options
-        )
+        fmu = natives[f"FiveBarSlider-{kind}"]
+        run = cosimulate(fmu, slips, Inputs(speed=44.0), interface="model-exchange", **options)
         assert run.status == within.status == 3
         assert run.message == within.message
         assert run.time[-1] == pytest.approx(within.time[-1], abs=1e-9)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from .bare_master import DISCARD, ERROR, Fmu
 from .models import MODELS, Changes, Model, each
 from .runner import run_in_process
 from .test_description import INPUTS
@@ -27,10 +28,7 @@ BAD_ANYWHERE = {
 BAD_PARAMETERS = {
     "FiveBarSlider": {
         **BAD_ANYWHERE,
-        "input not a number": (
-            {"slider.force": NAN},
-            "input slider.force is nan at t = 0 s: it must be a finite number",
-        ),
+        "input not a number": ({"slider.force": NAN}, "input slider.force is nan at t = 0 s: it must be a finite"),
         "not to be assembled": ({"initial.slider_position": 1.0}, "the links cannot be joined at crank angle 0 rad"),
         "at the limit of assembly": ({"initial.slider_position": 0.19649999}, "limit of assembly at crank angle 0 rad"),
     },
@@ -38,18 +36,13 @@ BAD_PARAMETERS = {
         **BAD_ANYWHERE,
         "axial mode": ({"axial.mode": 3}, "parameter axial.mode is 3: it must be 0 (force), 1 (speed) or 2 (groove)"),
         "input too large": ({"axial.speed": 1e300}, "the energy at the start is not finite: "),
-        "not to be assembled": (
-            {"initial.shift_position": 2.0},
-            "the rod does not reach the guide at crank angle 0 rad",
-        ),
+        "not to be assembled": ({"initial.shift_position": 2.0}, "the rod does not reach the guide at crank angle 0"),
     },
 }
 
 
 def initialise_badly(fmu: str, folder: str, cases: list[dict[str, Any]], times: int) -> list[Any]:
     """Statuses, log and trouble of failed initialisations; every instance is used on and then freed."""
-    from bare_master import DISCARD, ERROR, Fmu
-
     fmu = Fmu(fmu, folder)
     found = []
     for values in cases:
@@ -119,9 +112,7 @@ BAD_STEPS = {
     "not a number": (0.01, NAN, 1, "a step of nan s from t = 0.01 s: both must be finite numbers"),
     "backwards": (0.009, 1e-3, 1, "a step backwards: it starts at t = 0.009 s, but the state is at t = 0.01 s"),
 }
-LIMIT, TOO_SMALL = (
-    f"in the step from t = 0.01 s: {what}" for what in ("limit of assembly at crank", "the step size fell to")
-)
+LIMIT, TOO_SMALL = (f"in the step from t = 0.01 s: {what}" for what in ("limit of assembly at", "the step size fell"))
 #: Input and value, the value of solver.status, and what the sentence must say.
 BAD_INPUTS = {
     "FiveBarSlider": {
@@ -131,12 +122,7 @@ BAD_INPUTS = {
         "beyond floats": ("slider.force", 1e300, 4, TOO_SMALL),
     },
     "SliderCrank": {
-        "force of no use": (
-            "axial.force",
-            NAN,
-            2,
-            "input axial.force is nan at t = 0.01 s: it must be a finite number",
-        ),
+        "force of no use": ("axial.force", NAN, 2, "input axial.force is nan at t = 0.01 s: it must be a finite"),
         "crank pulled out": ("axial.speed", -30.0, 3, LIMIT),
         "beyond floats": ("axial.acceleration", 1e300, 4, TOO_SMALL),
     },
@@ -145,8 +131,6 @@ BAD_INPUTS = {
 
 def step_badly(fmu: str, folder: str, cases: list[Any]) -> list[Any]:
     """After ten good steps a bad one, and then a good one; beside a run without the bad one."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     good = fmu.instantiate().start()
     good.run([1e-3] * 10)
@@ -219,19 +203,15 @@ def test_bad_step_is_refused_and_the_last_good_state_stays(
     assert found["trouble"][0] == code
     assert found["trouble"][1].startswith(sentence)
     assert found["log"] == [[2, "logStatusDiscard", found["trouble"][1]]]
-    assert found["terminated"] == [0, 1]
-    assert found["readable"] == 0
+    assert (found["terminated"], found["readable"]) == ([0, 1], 0)
     assert found["same"]
     assert found["saved"] > 100
-    assert found["again"] == 0
-    assert found["after"] == [0, ""]
+    assert (found["again"], found["after"]) == (0, [0, ""])
     assert found["like the run without it"]
 
 
 def nan_input_read(fmu: str, folder: str, inputs: list[str]) -> list[Any]:
     """Outputs read while an input is not finite, and whether they are as before when it is put back."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     found = []
     for name in inputs:
@@ -257,8 +237,6 @@ def test_outputs_under_an_input_that_is_not_finite_are_the_last_good_ones(
 
 def out_of_order(fmu: str, folder: str) -> list[Any]:
     """Steps before the initialisation and after the end, values set where they cannot be, states of no run."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     instance = fmu.instantiate()
     found = [[instance.step(0.0, 1e-3), instance.trouble()]]
@@ -279,13 +257,9 @@ def test_calls_out_of_order(fmu: Path, model: Model, tmp_path: Path) -> None:
     assert before == [2, [5, "a step at t = 0 s before the initialisation"]]
     # the default: 5 cm, 12 in
     assert parameter[:2] == [3, pytest.approx({"FiveBarSlider": 0.05, "SliderCrank": 0.3048}[model.name], rel=1e-15)]
-    assert parameter[2] == [
-        3,
-        "logStatusError",
-        "crank.length is a fixed parameter, set after the initialisation: the value 0.06 was not taken",
-    ]
-    assert output[:2] == [3, False]
-    assert output[2][2] == "crank.angle is an output: the value 1.0 was not taken"
+    said = "crank.length is a fixed parameter, set after the initialisation: the value 0.06 was not taken"
+    assert parameter[2] == [3, "logStatusError", said]
+    assert (output[:2], output[2][2]) == ([3, False], "crank.angle is an output: the value 1.0 was not taken")
     assert restored == before
 
 
@@ -295,16 +269,13 @@ PHASES: dict[str, tuple[list[str], list[str]]] = {
     "in initialisation": (["setup", "enter"], ["setup", "enter", "step"]),
     "running": (["setup", "enter", "exit", "step"], ["setup", "enter", "exit"]),
     "terminated": (
-        ["setup", "enter", "exit", "step", "terminate"],
-        ["setup", "enter", "exit", "step", "set input", "set parameter"],
+        ["setup", "enter", "exit", "step", "terminate"], ["setup", "enter", "exit", "step", "set input", "set parameter"],
     ),
-}
+}  # fmt: skip
 
 
 def refused_calls(fmu: str, folder: str, name: str, lead: list[str], calls: list[str]) -> list[Any]:
     """Status of each call, solver.status, the sentence, and whether it left the outputs; then of what is right to do."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
 
     def do(instance, call):
@@ -359,8 +330,6 @@ def test_calls_that_the_phase_of_a_run_does_not_allow(
 
 def go_on_regardless(fmu: str, folder: str, name: str, value: float) -> list[Any]:
     """A master that overlooks a refused step and goes on."""
-    from bare_master import Fmu
-
     instance = Fmu(fmu, folder).instantiate().start()
     instance.set(name, value)
     return [[instance.step(0.1 * k, 0.1), instance.trouble()] for k in range(4)]
@@ -375,8 +344,7 @@ def test_the_cause_stays_where_a_master_goes_on_after_a_refused_step(
     fmu: Path, tmp_path: Path, name: str, value: float
 ) -> None:
     first, *others = run_in_process(go_on_regardless, fmu, tmp_path, name, value)
-    assert first[0] == 2
-    assert first[1][0] == 3
+    assert (first[0], first[1][0]) == (2, 3)
     assert first[1][1].startswith("in the step from t = 0 s: limit of assembly")
     for k, (status, trouble) in enumerate(others, 1):
         assert status == 2
@@ -386,8 +354,6 @@ def test_the_cause_stays_where_a_master_goes_on_after_a_refused_step(
 
 def wrong_calls(fmu: str, folder: str) -> list[Any]:
     """Variables that are not there or of another type; each instance is used on and freed."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     found = []
     for call in (
@@ -426,8 +392,6 @@ def interrupt(fmu: str, folder: str) -> list[Any]:
     import signal
     import time
 
-    from bare_master import Fmu
-
     signal.signal(signal.SIGALRM, signal.default_int_handler)
     fmu = Fmu(fmu, folder)
     ends = []
@@ -462,8 +426,6 @@ def test_interrupt_in_a_step_ends_the_run_and_not_the_process(fmu: Path, tmp_pat
 def escape(fmu: str, folder: str) -> list[Any]:
     """Exceptions that a slave cannot catch, one a run; what the next calls return, and how many slaves are left."""
     import gc
-
-    from bare_master import Fmu
 
     fmu = Fmu(fmu, folder)
     found, kind = [], None
@@ -503,8 +465,6 @@ def test_exception_that_a_slave_cannot_catch_leaves_it_usable(fmu: Path, tmp_pat
 
 def refuse_in_percent(fmu: str, folder: str) -> list[Any]:
     """A refused step whose sentence carries printf conversions."""
-    from bare_master import Fmu
-
     instance = Fmu(fmu, folder).instantiate().start()
     status = instance.step(0.0, 0.0)
     return [status, instance.log, instance.get("solver.message")]

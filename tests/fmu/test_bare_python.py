@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 from analysis.export import SOURCES, python_fmu
+from tests.scripts import called
 
+from .bare_master import Fmu
 from .models import each
 from .runner import run_in_process
 
@@ -30,9 +32,6 @@ VALUES = {
 def run_bare(fmu: str, folder: str, values: dict[str, float], steps: int) -> list[list[float]]:
     """Outputs after each millisecond, by ctypes on the FMU's library."""
     import importlib.util
-    import sys
-
-    from bare_master import Fmu
 
     # no import of these can have been hidden: nothing has been loaded yet
     installed = [name for name in ("pip", "numpy", "pythonfmu", "linkwork", "fmpy") if importlib.util.find_spec(name)]
@@ -47,11 +46,8 @@ def run_bare(fmu: str, folder: str, values: dict[str, float], steps: int) -> lis
     assert instance.terminate() == 0
     instance.free()
     homes = (sys.prefix, sys.base_prefix, folder)
-    strangers = [
-        m.__file__
-        for m in list(sys.modules.values())
-        if getattr(m, "__file__", None) and not m.__file__.startswith(homes) and "bare_master" not in m.__file__
-    ]
+    files = [m.__file__ for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
+    strangers = [file for file in files if not file.startswith(homes) and "bare_master" not in file]
     assert [path for path in strangers if not path.endswith("script.py")] == []
     return rows
 
@@ -62,9 +58,8 @@ def run_fmpy(fmu: str, values: dict[str, float], steps: int) -> list[list[float]
 
     variables = read_model_description(fmu).modelVariables
     outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
-    result = simulate_fmu(
-        fmu, stop_time=steps * 1e-3, step_size=1e-3, output_interval=1e-3, start_values=values, output=outputs
-    )
+    times = {"stop_time": steps * 1e-3, "step_size": 1e-3, "output_interval": 1e-3}
+    result = simulate_fmu(fmu, **times, start_values=values, output=outputs)
     return [[float(row[name]) for name in outputs] for row in result]
 
 
@@ -105,8 +100,6 @@ def test_same_values_as_through_fmpy_bit_for_bit(
 
 def instantiate_only(fmu: str, folder: str) -> str:
     """What an FMU says that cannot be instantiated."""
-    from bare_master import Fmu
-
     try:
         Fmu(fmu, folder).instantiate()
     except RuntimeError as error:
@@ -124,12 +117,4 @@ def test_sources_use_nothing_newer_than_the_oldest_python(tmp_path: Path) -> Non
     # where there is no such interpreter: syntax and the standard library's names, by the types of that version
     options = ["--python-version", OLDEST, "--cache-dir", str(tmp_path), "--config-file", ""]
     what = ["--ignore-missing-imports", "--package", "linkwork", "--module", "slave"]
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", *options, *what],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=SOURCES,
-        env=os.environ | {"MYPYPATH": str(SOURCES)},
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    called(sys.executable, "-m", "mypy", *options, *what, cwd=SOURCES, env=os.environ | {"MYPYPATH": str(SOURCES)})

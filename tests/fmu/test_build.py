@@ -75,11 +75,8 @@ def test_what_the_binaries_need_is_what_the_documentation_says(fmu: Path, model:
 def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, model: Model, build_variant: Build) -> None:
     def modules(path: Path) -> set[str]:
         with ZipFile(path) as archive:
-            return {Path(name).parts[1] for name in archive.namelist() if name.startswith("resources/")} - {
-                "pythonfmu",
-                "slavemodule.txt",
-                "guid.txt",
-            }
+            tops = {Path(name).parts[1] for name in archive.namelist() if name.startswith("resources/")}
+            return tops - {"pythonfmu", "slavemodule.txt", "guid.txt"}
 
     ours = modules(fmu)
     tags = {name.removesuffix(".py")[-8:] for name in ours}
@@ -172,13 +169,8 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
     ids=["one", "all", "unknown", "usage"],
 )
 def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, message: str) -> None:
-    done = subprocess.run(
-        [sys.executable, str(Path(build_fmu.__file__)), *arguments, "--dest", str(tmp_path), "--kinds", "python"],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    command = [sys.executable, build_fmu.__file__, *arguments, "--dest", str(tmp_path), "--kinds", "python"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == code, done.stderr
     assert message in (done.stdout if code == 0 else done.stderr)
     built = {path.stem for path in tmp_path.glob("*.fmu")}

@@ -3,6 +3,7 @@
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from .bare_master import Fmu
 from .described import read_unknowns
 from .drawn import drawn
 from .models import MODES, Model
@@ -12,8 +13,6 @@ from .test_description import ROWS
 
 def perturb_start(fmu: str, folder: str, cases: list[dict[str, float]]) -> dict[str, list[str]]:
     """For all drives: which outputs at the start change with each parameter and input."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     found = {}
     for case in cases:

@@ -98,9 +98,8 @@ class Oracle:
         at = casadi.vertcat(s.x, s.u, s.p)
         run = [s.x, s.modes, s.u, s.p]
         given = casadi.vertcat(own, state, s.u)
-        self.begin = casadi.Function(
-            "b", [s.modes, own, state, s.u], [x, p, casadi.jacobian(casadi.vertcat(x, p), given)]
-        )
+        jacobian = casadi.jacobian(casadi.vertcat(x, p), given)
+        self.begin = casadi.Function("b", [s.modes, own, state, s.u], [x, p, jacobian])
         self.rows = casadi.Function("r", run, [rows, casadi.jacobian(rows, at)])
         self.jump = casadi.Function("j", run, [trace.jump, casadi.jacobian(trace.jump, at)])
         entries = interface(mechanism)
@@ -265,7 +264,7 @@ def test_after_steps(library: Library, fresh: bool) -> None:
                     assert put(instance, {name: jumped[n]}) == OK
                     rows, _ = of.run(case, x, jumped, p, [name])
                     close(np.array(instance.get(*of.unknowns)), rows - limit(of), np.abs(rows) + 1.0)
-                    assert instance(f"SetFMU{'s' if library.fmi == 2 else 'S'}tate", saved) == OK
+                    assert instance.with_state("Set", saved) == OK
 
 
 def limit(of: Oracle) -> Matrix:

@@ -1,7 +1,6 @@
 """Where a Python FMU can be unpacked, and the calls from which its guard keeps PythonFMU's library."""
 
 import os
-import subprocess
 import sys
 import tempfile
 from importlib import resources
@@ -16,6 +15,7 @@ from analysis.export import NATIVE, PLATFORMS, SOURCES, build_native, compile_li
 from analysis.export.python_fmu import PYTHONFMU, compile_guard
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import cosimulation, unpacking_folder
+from tests.scripts import called
 
 from .c_host import Unpacked, compile_host, emulator, python_path, run_host, unpack, wine_settings
 from .runner import HERE, run_in_process
@@ -178,14 +178,7 @@ assert i.step(0.0, -1.0) == 2 and i.log[-1][0] == 2
 
 def end_of(fmu: Path, folder: Path, call: str = CALLS["three slashes"]) -> None:
     """Unpack the FMU into the folder and make the call, in a process of its own; it must end well."""
-    done = subprocess.run(
-        [sys.executable, "-c", _CALL + call, str(HERE), str(fmu), str(folder)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    called(sys.executable, "-c", _CALL + call, HERE, fmu, folder, timeout=60.0)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="not every name can be given to a folder there")
@@ -240,9 +233,7 @@ def test_two_python_fmus_let_go_of_python_before_a_process_in_c_ends(fmus: dict[
     unpacked = [unpack(fmus[name], tmp_path / name) for name in ("FiveBarSlider", "SliderCrank")]
     for order in (unpacked, unpacked[::-1]):
         given = [str(part) for u in order for part in (u.library, u.token, (u.folder / "resources").as_uri())]
-        environment = os.environ | python_path()
-        done = subprocess.run([tmp_path / "two", *given], capture_output=True, check=False, env=environment, timeout=60)
-        assert done.returncode == 0, done.stderr
+        called(tmp_path / "two", *given, env=os.environ | python_path(), timeout=60.0)
 
 
 def put_guard_before(fmu: Unpacked) -> None:

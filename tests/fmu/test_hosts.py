@@ -95,6 +95,4 @@ def test_instances_in_threads_are_faster_than_one_after_the_other(host: Path, fm
                 return
     if min(both) > 0.8 * min(one):
         pytest.skip("two processes are no faster than one: others have the second core")
-    pytest.fail(
-        f"microseconds a step: in threads {min(threaded)}, one after the other {min(one)}, in processes {min(both)}"
-    )
+    pytest.fail(f"µs a step: in threads {min(threaded)}, one after the other {min(one)}, in processes {min(both)}")

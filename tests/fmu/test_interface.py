@@ -33,27 +33,21 @@ ADDED = {
     "rotor-on-cart": TIME + ENERGIES + POWERS + MARGIN,
 }
 ENERGY = {"energy.dissipated": "power.dissipated", "energy.supplied": "power.supplied"}
+
+
+def states_of(turning: tuple[str, ...], moving: tuple[str, ...] = ()) -> dict[str, str]:
+    """Coordinates and rates of bodies that turn, and of bodies that move along a line, each with its derivative."""
+    rows = [(name, "angle", "speed") for name in turning] + [(name, "position", "velocity") for name in moving]
+    rates = {f"{name}.{place}": f"{name}.{rate}" for name, place, rate in rows}
+    return rates | {f"{name}.{rate}": f"{name}.acceleration" for name, _, rate in rows}
+
+
 #: The components of the state, each with its derivative.
 STATES = {
-    "five-bar": {
-        "crank.angle": "crank.speed",
-        "slider.position": "slider.velocity",
-        "crank.speed": "crank.acceleration",
-        "slider.velocity": "slider.acceleration",
-    },
-    "slider-crank": {
-        "crank.angle": "crank.speed",
-        "shift.position": "shift.velocity",
-        "crank.speed": "crank.acceleration",
-        "shift.velocity": "shift.acceleration",
-    },
-    "pendulum": {"pendulum.angle": "pendulum.speed", "pendulum.speed": "pendulum.acceleration"},
-    "rotor-on-cart": {
-        "rotor.angle": "rotor.speed",
-        "cart.position": "cart.velocity",
-        "rotor.speed": "rotor.acceleration",
-        "cart.velocity": "cart.acceleration",
-    },
+    "five-bar": states_of(turning=("crank",), moving=("slider",)),
+    "slider-crank": states_of(turning=("crank",), moving=("shift",)),
+    "pendulum": states_of(turning=("pendulum",)),
+    "rotor-on-cart": states_of(turning=("rotor",), moving=("cart",)),
 }
 
 
@@ -84,14 +78,9 @@ def started(mechanism: Mechanism, modes: dict[str, int], random: Random, **other
     inputs = {name: values[name] + random.uniform(0.5, 1.0) for name in mechanism.input_names}
     if "axial.speed" in inputs:
         inputs["axial.speed"] = 0.05
-    return Plant(
-        mechanism,
-        mechanism.parameters(**fields),
-        mechanism.initial(**initial),
-        inputs=inputs,
-        tolerance=1e-12,
-        **{field_name(name): value for name, value in modes.items()},
-    )
+    chosen = {field_name(name): value for name, value in modes.items()}
+    start = mechanism.initial(**initial)
+    return Plant(mechanism, mechanism.parameters(**fields), start, inputs=inputs, tolerance=1e-12, **chosen)
 
 
 def test_the_mechanisms_variables_come_first_and_then_what_a_native_fmu_adds(mechanism: Mechanism) -> None:
@@ -99,16 +88,10 @@ def test_the_mechanisms_variables_come_first_and_then_what_a_native_fmu_adds(mec
     names = [entry.variable.name for entry in entries]
     assert [entry.reference for entry in entries] == list(range(len(entries)))
     assert tuple(entry.variable for entry in entries[: len(mechanism.variables)]) == mechanism.variables
-    added = [
-        (
-            entry.variable.name,
-            entry.variable.causality,
-            entry.variable.unit,
-            None if entry.derivative_of is None else names[entry.derivative_of],
-        )
-        for entry in entries[len(mechanism.variables) :]
-    ]
-    assert added == ADDED[mechanism.name]
+    of = [None if entry.derivative_of is None else names[entry.derivative_of] for entry in entries]
+    added = [(entry.variable.name, entry.variable.causality, entry.variable.unit) for entry in entries]
+    count = len(mechanism.variables)
+    assert [(*row, rate) for row, rate in zip(added[count:], of[count:])] == ADDED[mechanism.name]
     assert len(set(names)) == len(names)
 
 

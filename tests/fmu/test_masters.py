@@ -16,7 +16,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from tests.scripts import called
+
 from . import masters
+from .bare_master import Fmu
 from .c_host import compile_host, python_path, run_host, unpack
 from .models import Model
 from .runner import run_in_process
@@ -59,38 +62,19 @@ class Case(NamedTuple):
 CASES = {
     "FiveBarSlider": Case(
         {
-            "slider.damping": 25.0,
-            "slider.coulomb_friction": 0.3,
-            "coupler.point_distance": 0.07,
-            "initial.crank_speed": 30.0,
-            "drive.torque": 0.3,
-            "slider.force": 0.5,
+            "slider.damping": 25.0, "slider.coulomb_friction": 0.3, "coupler.point_distance": 0.07,
+            "initial.crank_speed": 30.0, "drive.torque": 0.3, "slider.force": 0.5,
         },
-        {"drive.mode": 0},
-        "slider.force",
-        2.0,
-        "slider.position",
-        1e5,
+        {"drive.mode": 0}, "slider.force", 2.0, "slider.position", 1e5,
     ),
     "SliderCrank": Case(
         {
-            "guide.twist": 4.4,
-            "slider.damping": 25.0,
-            "slider.coulomb_friction": 0.3,
-            "shift.stiffness": 500.0,
-            "gravity.y": -9.81,
-            "initial.crank_speed": 30.0,
-            "drive.torque": 3.0,
-            "axial.force": 0.5,
-            "slider.load": 4.0,
+            "guide.twist": 4.4, "slider.damping": 25.0, "slider.coulomb_friction": 0.3, "shift.stiffness": 500.0,
+            "gravity.y": -9.81, "initial.crank_speed": 30.0, "drive.torque": 3.0, "axial.force": 0.5, "slider.load": 4.0,
         },
-        {"drive.mode": 0, "axial.mode": 0},
-        "axial.force",
-        2.0,
-        "shift.position",
-        2e7,
+        {"drive.mode": 0, "axial.mode": 0}, "axial.force", 2.0, "shift.position", 2e7,
     ),
-}
+}  # fmt: skip
 
 
 #: For masters that set Reals alone: the modes are those at the start, in which speeds are commanded.
@@ -102,8 +86,8 @@ COMMANDED = {
     for name, case in CASES.items()
 }
 COMMANDED["SliderCrank"] = COMMANDED["SliderCrank"]._replace(
-    changed="slider.load", later=8.0, shown="drive.applied_torque", too_much=0.0
-)
+    changed="slider.load", later=8.0, shown="drive.applied_torque", too_much=0.0,
+)  # fmt: skip
 
 ALL = ("python", "native", "native-fmi3")
 NATIVE = ALL[1:]
@@ -212,8 +196,6 @@ def by_hand(
     fmu: str, folder: str, reals: dict[str, float], integers: dict[str, int], changed: str, later: float
 ) -> Any:
     """The case step by step: 50 of 1 ms, the input changed, 50 more."""
-    from bare_master import Fmu
-
     instance = Fmu(fmu, folder).instantiate().start(reals | integers)
     for k in range(100):
         if k == 50:
@@ -244,7 +226,7 @@ def ends(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Cal
 SUMS = {
     "FiveBarSlider": ("pin.", "acceleration", "guide_force"),
     "SliderCrank": ("acceleration", "guide.", "bearing.", "crank_pin.f", "slider_pin.f", "applied_force", "residual"),
-}
+}  # fmt: skip
 
 
 #: The same algorithm in the same language; in C; other algorithms at their own tolerances.
@@ -303,14 +285,9 @@ def test_refused_step(run: Callable[..., dict[str, Any]], ends: Callable[..., An
 def test_libcosim_ends_its_process_on_fmi_3(natives: dict[str, Path], model: Model) -> None:
     # it is for FMI 1.0 and 2.0: what a version of it that reads FMI 3.0 does belongs in the table
     need("libcosimpy")
+    fmu, case = natives[f"{model.name}-native-fmi3"], list(CASES[model.name][:4])
     with pytest.raises(AssertionError, match="by_libcosimpy ended with -"):
-        run_in_process(
-            masters.by_libcosimpy,
-            natives[f"{model.name}-native-fmi3"],
-            list(CASES[model.name][:4]),
-            OUTPUTS[model.name],
-            STEPS,
-        )
+        run_in_process(masters.by_libcosimpy, fmu, case, OUTPUTS[model.name], STEPS)
 
 
 def bad_by_fmpy(fmu: str, reals: dict[str, float]) -> list[Any]:
@@ -359,13 +336,9 @@ def test_bad_parameter_under_libcosimpy(run: Callable[..., dict[str, Any]], mode
 PAGE = Path(__file__).parents[2] / "docs" / "masters.md"
 #: Which section of the page is of which master.
 SECTIONS = {
-    "FMPy": "fmpy",
-    "WebAssembly runtimes": "wasmtime",
-    "libcosim": "libcosimpy",
-    "ecos": "ecospy",
-    "CoFMUPy": "cofmupy",
-    "PathSim": "pathsim",
-}
+    "FMPy": "fmpy", "WebAssembly runtimes": "wasmtime", "libcosim": "libcosimpy", "ecos": "ecospy",
+    "CoFMUPy": "cofmupy", "PathSim": "pathsim",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -376,10 +349,7 @@ def test_the_code_of_the_page_runs(natives: dict[str, Path], tmp_path: Path, sec
     (tmp_path / "build").mkdir()
     for name in ("FiveBarSlider-native", "FiveBarSlider-native-fmi3"):
         shutil.copy2(natives[name], tmp_path / "build" / f"{name}.fmu")
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    called(sys.executable, "-c", code, cwd=tmp_path, timeout=120.0)
 
 
 def test_the_page_says_of_every_master_whether_it_was_tried() -> None:

@@ -17,6 +17,7 @@ import pytest
 
 from analysis.export import NATIVE, NATIVE_FMI3, build_native
 from analysis.export.native_fmu import source_files
+from tests.scripts import called
 
 from ..conftest import NATIVE_MECHANISMS
 
@@ -87,11 +88,8 @@ def counted(folder: Path) -> tuple[dict[Line, int], dict[tuple[Line, int], int]]
     branches: dict[tuple[Line, int], int] = {}
     texts = {path.name: path.read_text(encoding="utf-8").splitlines() for path in SHELL.glob("*.[ch]")}
     for data in folder.glob("*/*.gcda"):
-        done = subprocess.run(
-            ["gcov", "--json-format", "--stdout", "--branch-probabilities", data.name],
-            cwd=data.parent, check=True, capture_output=True, text=True,
-        )  # fmt: skip
-        for document in done.stdout.splitlines():
+        report = called("gcov", "--json-format", "--stdout", "--branch-probabilities", data.name, cwd=data.parent)
+        for document in report.splitlines():
             for file in json.loads(document)["files"]:
                 name = Path(file["file"]).name
                 for line in file["lines"] if name in texts else ():
@@ -105,15 +103,9 @@ def counted(folder: Path) -> tuple[dict[Line, int], dict[tuple[Line, int], int]]
 
 def run_tests(fmus: Path, **environment: str) -> None:
     """Run the tests of native FMUs on the FMUs of a folder."""
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *(f"tests/fmu/{name}" for name in TESTS)],
-        cwd=ROOT,
-        env=os.environ | environment | {"LINKWORK_NATIVE_FMUS": str(fmus)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+    tests = [f"tests/fmu/{name}" for name in TESTS]
+    there = os.environ | environment | {"LINKWORK_NATIVE_FMUS": str(fmus)}
+    called(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests, cwd=ROOT, env=there, timeout=7200.0)
 
 
 def test_every_line_and_branch_of_the_shell_is_reached(tmp_path: Path) -> None:
@@ -134,9 +126,7 @@ def test_every_line_and_branch_of_the_shell_is_reached(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def sanitized(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """Native FMUs under the sanitizers, and the environment that a Python needs to load them."""
-    runtime = subprocess.run(
-        ["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
-    ).stdout.strip()
+    runtime = called("gcc", "-print-file-name=libasan.so").strip()
     if not Path(runtime).is_absolute():
         pytest.skip("GCC has no runtime of its AddressSanitizer here")
     flags = ("-O1", "-g1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -164,9 +154,5 @@ def test_sanitizers_and_probe_find_nothing_in_many_calls(
     sanitized: tuple[Path, dict[str, str]], name: str, calls: int
 ) -> None:
     fmus, environment = sanitized
-    options = ["--calls", str(calls), "--time", "1500", "--strict"]
-    done = subprocess.run(
-        [sys.executable, "-m", "analysis.cli", "probe", str(fmus / f"{name}.fmu"), *options],
-        cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    command = (sys.executable, "-m", "analysis.cli", "probe", fmus / f"{name}.fmu", "--calls", calls)
+    called(*command, "--time", "1500", "--strict", cwd=ROOT, env=os.environ | environment, timeout=1800.0)

@@ -12,6 +12,7 @@ from build_fmu import FMUS
 from linkwork.errors import LinkworkError
 from linkwork.plant import Plant
 
+from .bare_master import Fmu
 from .drawn import drawn
 from .models import Model
 from .runner import run_in_process
@@ -27,8 +28,6 @@ def outputs_of_fmus(
 
     Of each file, unpacked into its folder, with values, inputs, times and step sizes.
     """
-    from bare_master import Fmu
-
     every = []
     for fmu, folder, values, inputs, times, sizes in cases:
         instance = Fmu(fmu, folder).instantiate().start(values, start=times[0])

@@ -4,10 +4,8 @@ emulator. Those of macOS are inspected only.
 The emulators are Wine for Windows (Debian: wine64) and QEMU for 64-bit ARM (qemu-user-static, libc6-arm64-cross).
 """
 
-import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import resources
@@ -18,6 +16,7 @@ import pytest
 
 from analysis.export import KINDS, PLATFORMS, build_native
 from build_fmu import FMUS
+from tests.scripts import called
 
 from .c_host import compile_host, emulator, run_host, unpack, wine_settings
 from .runner import run_in_process
@@ -105,11 +104,8 @@ def most(name: str) -> int:
 def everywhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Every native FMU for all platforms."""
     folder = tmp_path_factory.mktemp("everywhere")
-    return {
-        f"{model}-{kind}": build_native(FMUS[model], KINDS[kind], folder, list(PLATFORMS))
-        for model in FMUS
-        for kind in ("native", "native-fmi3")
-    }
+    every = [(model, kind) for model in FMUS for kind in ("native", "native-fmi3")]
+    return {f"{model}-{kind}": build_native(FMUS[model], KINDS[kind], folder, list(PLATFORMS)) for model, kind in every}
 
 
 @pytest.mark.parametrize("name", NATIVE)
@@ -171,9 +167,7 @@ def test_what_fmpy_compiles_of_the_sources_runs(natives: dict[str, Path], tmp_pa
         for entry in archive.namelist():
             if not entry.startswith("binaries/"):
                 bare.writestr(entry, archive.read(entry))
-    command = [sys.executable, "-m", "fmpy", "compile", f"{name}.fmu"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, env=dict(os.environ))
-    assert done.returncode == 0, done.stdout + done.stderr
+    called(sys.executable, "-m", "fmpy", "compile", f"{name}.fmu", cwd=tmp_path)
     # in Python, where libm is already: FMPy does not link it, and has no place to say that it is needed
     expected, found = (run_in_process(last_row, fmu) for fmu in (natives[name], tmp_path / f"{name}.fmu"))
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-8)

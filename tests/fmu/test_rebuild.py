@@ -30,24 +30,11 @@ def built_by(user: Path, platforms: str, **variables: str) -> dict[str, bytes]:
         with lock_folder(kept):
             shutil.copytree(kept, user / "cache" / kept.name)
     changed = {"HOME": str(user), "TMPDIR": str(user / "tmp"), "LINKWORK_CACHE_DIR": str(user / "cache")}
+    command = [sys.executable, str(ROOT / "build_fmu.py"), "SliderCrank", "--dest", str(user / "fmus")]
     done = subprocess.run(
-        [
-            sys.executable,
-            str(ROOT / "build_fmu.py"),
-            "SliderCrank",
-            "--dest",
-            str(user / "fmus"),
-            "--platforms",
-            platforms,
-        ],
-        cwd=user,
-        env={**os.environ, **changed, **variables},
-        umask=int(variables["MASK"], 8),
-        capture_output=True,
-        text=True,
-        timeout=500,
-        check=False,
-    )
+        [*command, "--platforms", platforms], cwd=user, env={**os.environ, **changed, **variables},
+        umask=int(variables["MASK"], 8), capture_output=True, text=True, timeout=500, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return {path.name: path.read_bytes() for path in (user / "fmus").iterdir()}
 
@@ -55,19 +42,11 @@ def built_by(user: Path, platforms: str, **variables: str) -> dict[str, bytes]:
 @pytest.mark.slow
 def test_two_users_build_the_same_bytes_for_all_platforms(tmp_path: Path) -> None:
     one = built_by(tmp_path / "one", "all", MASK="022", TZ="UTC", PYTHONHASHSEED="1")
-    other = built_by(
-        tmp_path / "another user" / "deeper",
-        "all",
-        MASK="077",
-        TZ="Asia/Kolkata",
-        PYTHONHASHSEED="2",
-        LC_ALL="C",
-        USER="b",
-    )
+    others = {"MASK": "077", "TZ": "Asia/Kolkata", "PYTHONHASHSEED": "2", "LC_ALL": "C", "USER": "b"}
+    other = built_by(tmp_path / "another user" / "deeper", "all", **others)
     assert set(one) == {"SliderCrank.fmu", "SliderCrank-native.fmu", "SliderCrank-native-fmi3.fmu"}
-    assert {name: hashlib.sha256(text).hexdigest() for name, text in one.items()} == {
-        name: hashlib.sha256(text).hexdigest() for name, text in other.items()
-    }
+    sums = [{name: hashlib.sha256(text).hexdigest() for name, text in built.items()} for built in (one, other)]
+    assert sums[0] == sums[1]
     for path in sorted((tmp_path / "one" / "fmus").iterdir()):
         parts = list(rebuild(path))
         assert all(part.same for part in parts), parts

@@ -8,6 +8,7 @@ import pytest
 
 import build_fmu
 
+from .bare_master import DISCARD, Fmu
 from .models import MODELS, Changes, Model
 from .runner import run_in_process
 
@@ -20,10 +21,6 @@ def variant(build_variant: Callable[[Changes], Path], model: Model) -> Path:
 
 def run_together(fmus: list[str], folder: str, values: list[dict[str, float]]) -> list[Any]:
     """An instance of each FMU with its values, stepped in turn in one process, in torque drive."""
-    from pathlib import Path
-
-    from bare_master import Fmu
-
     loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
     given = [chosen | {"drive.torque": 0.2} for chosen in values]
     instances = [fmu.instantiate().start(chosen) for fmu, chosen in zip(loaded, given)]
@@ -75,9 +72,6 @@ def test_all_models_in_one_process(fmus: dict[str, Path], tmp_path: Path) -> Non
 def module_path(fmus: list[str], folder: str) -> list[Any]:
     """The module path before, and after instances of each FMU, one of them reset."""
     import sys
-    from pathlib import Path
-
-    from bare_master import Fmu
 
     before = list(sys.path)
     loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
@@ -97,10 +91,6 @@ def test_module_path_of_the_process_stays_as_it_was(fmus: dict[str, Path], tmp_p
 
 def fail_together(fmus: list[str], folder: str, values: list[dict[str, float]], bad: list[list[Any]]) -> list[Any]:
     """Instances of several FMUs that refuse a step, each in its turn, and are restored, beside the others."""
-    from pathlib import Path
-
-    from bare_master import DISCARD, Fmu
-
     loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
     instances = [fmu.instantiate().start(chosen) for fmu, chosen in zip(loaded, values)]
     for k in range(20):
@@ -160,14 +150,9 @@ def rebuild(root: str, folder: str, name: str, values: dict[str, float], changes
         fmu = build(FMUS[name], folder / "build", sources)
         tops = ("linkwork_", "five_bar_slave_", "slider_crank_slave_")
         modules.append(sorted(module for module in sys.modules if module.startswith(tops)))
-        end = simulate_fmu(
-            fmu,
-            stop_time=0.03,
-            step_size=1e-3,
-            output_interval=1e-3,
-            start_values=values | {"drive.torque": 0.2},
-            output=["crank.angle"],
-        )[-1]
+        times = {"stop_time": 0.03, "step_size": 1e-3, "output_interval": 1e-3}
+        given = values | {"drive.torque": 0.2}
+        end = simulate_fmu(fmu, **times, start_values=given, output=["crank.angle"])[-1]
         ends.append(float(end["crank.angle"]))
     return [str(fmu), ends, modules]
 
@@ -187,9 +172,6 @@ def many_cycles(fmu: str, folder: str, number: int) -> dict[str, Any]:
     import gc
     import os
     import sys
-    from pathlib import Path
-
-    from bare_master import Fmu
 
     fmu = Fmu(fmu, folder)
 
@@ -229,8 +211,6 @@ def body_again(fmu: str, folder: str, slave: str, times: int) -> list[Any]:
     import sys
     import threading
     import warnings
-
-    from bare_master import Fmu
 
     fmu = Fmu(fmu, folder)
     instance = fmu.instantiate().start()
@@ -283,12 +263,8 @@ def mix_loggers(fmus: list[str], root: str) -> list[Any]:
     inputs = dict.fromkeys(MECHANISM.input_names, 0.0)
     for fmu in fmus:
         initial = entry.initial
-        given = {
-            "modes": modes,
-            "tolerance": 1e-9,
-            "start_time": 0.0,
-            "inputs": inputs | {"drive.speed": entry.crank_speed},
-        }
+        acting = inputs | {"drive.speed": entry.crank_speed}
+        given = {"modes": modes, "tolerance": 1e-9, "start_time": 0.0, "inputs": acting}
         with (
             FmuRun(fmu, entry.parameters, initial, **given) as one,
             FmuRun(fmu, entry.parameters, initial, **given) as two,

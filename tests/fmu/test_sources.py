@@ -1,14 +1,14 @@
 """The sources of native FMUs in one program: both mechanisms and both standards, each behind its prefix."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
 
 from analysis.export import NATIVE, NATIVE_FMI3, compile_library, source_files, this_platform
-from analysis.export.description import Kind, token
+from analysis.export.description import token
 from analysis.export.native_fmu import COMPILED, PLATFORMS
 from build_fmu import FMUS
+from tests.scripts import called
 
 _MAIN = """
 #include <stdio.h>
@@ -53,10 +53,8 @@ _USED = {
 @pytest.mark.slow
 @pytest.mark.skipif(not this_platform().endswith("linux"), reason="the test reads ELF with nm")
 def test_all_link_into_one_program(tmp_path: Path) -> None:
-    target, options = (
-        PLATFORMS[this_platform()].target,
-        ("-std=c11", "-O0", "-fno-sanitize=undefined", "-Wall", "-Werror", "-Wno-unused-function"),
-    )
+    target = PLATFORMS[this_platform()].target
+    options = ("-std=c11", "-O0", "-fno-sanitize=undefined", "-Wall", "-Werror", "-Wno-unused-function")
     declarations, calls, objects, angles = [], [], [], []
     for mechanism in FMUS.values():
         for kind in (NATIVE, NATIVE_FMI3):
@@ -71,22 +69,17 @@ def test_all_link_into_one_program(tmp_path: Path) -> None:
             compile_library(folder, COMPILED, f"{prefix}.o", target, (*options, "-c", given))
             objects.append(f"{prefix}/{prefix}.o")
             names = [v.name for v in mechanism.variables]
-            calls.append(_call(kind, prefix, token(mechanism, kind), names.index("crank.angle")))
+            key, reference = token(mechanism, kind), names.index("crank.angle")
+            calls.append(_CALLS[kind.fmi].format(p=prefix, token=key, reference=reference))
             declarations += [f"fmi{kind.fmi}{f}TYPE {prefix}fmi{kind.fmi}{f};" for f in _USED[kind.fmi].split()]
             speed = next(v.start for v in mechanism.variables if v.name == "drive.speed")
             angles.append(0.1 * float(speed))
-            symbols = subprocess.run(
-                ["nm", "-g", "--defined-only", tmp_path / objects[-1]], capture_output=True, text=True
-            )
-            visible = [line.split()[-1] for line in symbols.stdout.splitlines()]
+            symbols = called("nm", "-g", "--defined-only", tmp_path / objects[-1])
+            visible = [line.split()[-1] for line in symbols.splitlines()]
             assert visible
             assert [name for name in visible if not name.startswith(f"{prefix}fmi{kind.fmi}")] == []
     main = _MAIN.format(declarations="\n".join(declarations), calls="".join(calls))
     (tmp_path / "main.c").write_text(main, encoding="utf-8")
     compile_library(tmp_path, ["main.c", *objects], "program", target, (*options, "-lm"))
-    printed = subprocess.run([tmp_path / "program"], capture_output=True, text=True, check=True).stdout.split()
+    printed = called(tmp_path / "program").split()
     assert [float(text) for text in printed] == pytest.approx(angles, rel=1e-12)
-
-
-def _call(kind: Kind, prefix: str, key: str, reference: int) -> str:
-    return _CALLS[kind.fmi].format(p=prefix, token=key, reference=reference)

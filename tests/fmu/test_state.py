@@ -5,6 +5,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+from .bare_master import DISCARD, ERROR, Fmu
 from .models import Model, each
 from .runner import run_in_process
 
@@ -12,26 +13,15 @@ from .runner import run_in_process
 VALUES = {
     "FiveBarSlider": {
         "torque drive": {
-            "drive.mode": 0,
-            "initial.crank_speed": 30.0,
-            "drive.torque": 0.2,
-            "slider.force": 0.5,
-            "slider.coulomb_friction": 0.1,
-            "load.fx": 0.3,
+            "drive.mode": 0, "initial.crank_speed": 30.0, "drive.torque": 0.2, "slider.force": 0.5,
+            "slider.coulomb_friction": 0.1, "load.fx": 0.3,
         },
         "speed drive": {"drive.speed": 30.0, "drive.acceleration": 20.0, "slider.force": 0.5},
     },
     "SliderCrank": {
         "forces": {
-            "drive.mode": 0,
-            "axial.mode": 0,
-            "initial.crank_speed": 12.0,
-            "initial.shift_velocity": 0.2,
-            "drive.torque": 5.0,
-            "axial.force": -3.0,
-            "slider.coulomb_friction": 0.1,
-            "shift.stiffness": 900.0,
-            "gravity.z": -9.81,
+            "drive.mode": 0, "axial.mode": 0, "initial.crank_speed": 12.0, "initial.shift_velocity": 0.2, "drive.torque": 5.0,
+            "axial.force": -3.0, "slider.coulomb_friction": 0.1, "shift.stiffness": 900.0, "gravity.z": -9.81,
         },
         "speeds": {"drive.speed": 9.0, "drive.acceleration": 20.0, "axial.speed": 0.3, "slider.load": 0.5},
         "speed, force": {"axial.mode": 0, "drive.speed": 9.0, "axial.force": 4.0, "shift.damping": 3.0},
@@ -39,7 +29,7 @@ VALUES = {
         "groove, torque": {"drive.mode": 0, "axial.mode": 2, "drive.torque": 4.0, "groove.amplitude": 0.07},
         "groove, speed": {"axial.mode": 2, "drive.speed": 8.0, "groove.amplitude": 0.07, "groove.ratio": 3.0},
     },
-}
+}  # fmt: skip
 #: One of them for tests of what does not depend on the drive.
 ONE = {model: next(iter(values.values())) for model, values in VALUES.items()}
 
@@ -49,80 +39,50 @@ WAITING = {"FiveBarSlider": {"drive.speed": 31.0}, "SliderCrank": {"drive.speed"
 OTHER = {
     "FiveBarSlider": {"drive.torque": -3.0, "drive.speed": 55.0, "slider.force": 4.0, "load.fy": 2.0},
     "SliderCrank": {
-        "drive.torque": -3.0,
-        "drive.speed": 5.0,
-        "axial.force": 20.0,
-        "axial.speed": -0.5,
-        "slider.load": 2.0,
+        "drive.torque": -3.0, "drive.speed": 5.0, "axial.force": 20.0, "axial.speed": -0.5, "slider.load": 2.0,
     },
-}
+}  # fmt: skip
 
 
 def save_diverge_restore(
     fmu: str, folder: str, values: dict[str, float], waiting: dict[str, float], other: dict[str, float]
 ) -> dict[str, Any]:
     """Save after 20 steps, go on, come back, go elsewhere, come back, go on again; and on in another instance."""
-    from bare_master import Fmu
-
-    fmu = Fmu(fmu, folder)
-
-    def go_on(instance, sizes=(1e-3, 3e-3, 1e-2, 1e-4) * 5):
-        rows = [instance.outputs()]
-        time = 0.02
-        for size in sizes:
-            assert instance.step(time, size) == 0
-            rows.append(instance.outputs())
-            time += size
-        return rows
-
+    fmu, sizes = Fmu(fmu, folder), (1e-3, 3e-3, 1e-2, 1e-4) * 5
     instance = fmu.instantiate("one").start(values)
     instance.run([1e-3] * 20)
     for name, value in waiting.items():
         instance.set(name, value)
     state = instance.save()
     data = instance.serialize(state)
-    first = go_on(instance)
+    first = instance.rows(sizes, 0.02)
     assert instance.restore(state) == 0
     for name, value in other.items():
         instance.set(name, value)
-    elsewhere = go_on(instance)
+    elsewhere = instance.rows(sizes, 0.02)
     assert instance.restore(state) == 0
-    again = go_on(instance)
+    again = instance.rows(sizes, 0.02)
     # a state outlives changes of the instance, and can be written again
     assert instance.serialize(state) == data
     fresh = fmu.instantiate("two")
     status, read = fresh.deserialize(data)
     assert status == 0
     assert fresh.restore(read) == 0
-    in_other_instance = go_on(fresh)
+    other = fresh.rows(sizes, 0.02)
     for one in (instance, fresh):
         assert one.free_state(state if one is instance else read) == 0
         assert one.terminate() == 0
         one.free()
-    return {
-        "data": data.decode("ascii"),
-        "first": first,
-        "elsewhere": elsewhere,
-        "again": again,
-        "other instance": in_other_instance,
-    }
+    return {"data": data.decode("ascii"), "first": first, "elsewhere": elsewhere, "again": again, "other": other}
 
 
 def go_on_elsewhere(fmu: str, folder: str, data: str) -> list[dict[str, float]]:
     """The same steps from a state that another process wrote."""
-    from bare_master import Fmu
-
     instance = Fmu(fmu, folder).instantiate("three")
     status, state = instance.deserialize(data.encode("ascii"))
     assert status == 0
     assert instance.restore(state) == 0
-    rows = [instance.outputs()]
-    time = 0.02
-    for size in (1e-3, 3e-3, 1e-2, 1e-4) * 5:
-        assert instance.step(time, size) == 0
-        rows.append(instance.outputs())
-        time += size
-    return rows
+    return instance.rows((1e-3, 3e-3, 1e-2, 1e-4) * 5, 0.02)
 
 
 @each(VALUES, "values")
@@ -131,14 +91,12 @@ def test_save_diverge_restore_repeat(fmu: Path, model: Model, tmp_path: Path, va
     runs = run_in_process(save_diverge_restore, fmu, tmp_path / "a", values, *inputs)
     assert runs["first"][-1] != runs["elsewhere"][-1]
     assert runs["again"] == runs["first"]
-    assert runs["other instance"] == runs["first"]
+    assert runs["other"] == runs["first"]
     assert run_in_process(go_on_elsewhere, fmu, tmp_path / "b", runs["data"]) == runs["first"]
 
 
 def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """Outputs of a run, of the same after a reset, and of the defaults after another."""
-    from bare_master import ERROR, Fmu
-
     fmu = Fmu(fmu, folder)
     instance = fmu.instantiate()
     rows = []
@@ -171,9 +129,8 @@ def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much:
 
 
 def test_reset(fmu: Path, model: Model, tmp_path: Path) -> None:
-    first, again, default, after_failures = run_in_process(
-        reset, fmu, tmp_path, ONE[model.name], model.force, model.too_much
-    )
+    given = (ONE[model.name], model.force, model.too_much)
+    first, again, default, after_failures = run_in_process(reset, fmu, tmp_path, *given)
     assert first == again
     assert first != default
     assert after_failures[1] == first[1]
@@ -181,8 +138,6 @@ def test_reset(fmu: Path, model: Model, tmp_path: Path) -> None:
 
 def after_refusal(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """State saved after a refused step: outputs, trouble, and the run that goes on from it, there and elsewhere."""
-    from bare_master import DISCARD, Fmu
-
     fmu = Fmu(fmu, folder)
     runs = []
     for fail in ("no", "force", "nan"):
@@ -216,8 +171,6 @@ def test_state_saved_after_a_refused_step(fmu: Path, model: Model, tmp_path: Pat
 
 def set_up_and_restored(fmu: str, folder: str, tolerance: float) -> list[float]:
     """Outputs after a step of two instances, the one with the master's tolerance, the other from its state before the start."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     one, other = fmu.instantiate(), fmu.instantiate()
     one.setup(start=1.0, tolerance=tolerance)
@@ -239,8 +192,6 @@ def test_a_state_saved_before_the_initialisation_has_the_masters_times_and_toler
 
 def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
     """Status and log of restoring what is not a state of this FMU; the instance is freed afterwards."""
-    from bare_master import Fmu
-
     fmu = Fmu(fmu, folder)
     found = []
     for piece in pieces:
@@ -288,8 +239,6 @@ def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> No
 
 def state_of(fmu: str, folder: str) -> str:
     """The state of a run, as bytes."""
-    from bare_master import Fmu
-
     instance = Fmu(fmu, folder).instantiate().start()
     instance.run([1e-3] * 3)
     return instance.serialize(instance.save()).decode("ascii")
