@@ -263,13 +263,8 @@ def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
     turning = np.cross(AXIS, crank.places)
     inward = -w * w * (crank.places * np.array([1.0, 1.0, 0.0]))
     m = crank.masses
-    equation(
-        crank.mass * g - m @ inward,
-        crank_acceleration=m @ turning,
-        shift_acceleration=crank.mass * AXIS,
-        bearing=-one,
-        crank_pin=one,
-    )
+    accelerations = {"crank_acceleration": m @ turning, "shift_acceleration": crank.mass * AXIS}
+    equation(crank.mass * g - m @ inward, **accelerations, bearing=-one, crank_pin=one)
     equation(
         np.cross(crank.centre, crank.mass * g) - m @ np.cross(crank.places, inward),
         crank_acceleration=m @ np.cross(crank.places, turning),

@@ -19,9 +19,9 @@ class Processor:
         binding.initialize_native_target()
         binding.initialize_native_asmprinter()
         triple = binding.get_default_triple()
-        machine = binding.Target.from_triple(triple).create_target_machine(
-            opt=3, jit=True, cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten()
-        )
+        cpu, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+        target = binding.Target.from_triple(triple)
+        machine = target.create_target_machine(opt=3, jit=True, cpu=cpu, features=features)
         self.engine = binding.create_mcjit_compiler(device.link_kernel(*kernel, functions, triple, machine), machine)
         self.engine.finalize_object()
         address = self.engine.get_function_address(device.ENTRY)
@@ -63,8 +63,5 @@ def cupy(functions: Any, *, available: bool = True) -> SimpleNamespace:
             return launch
 
     errors = SimpleNamespace(CUDARuntimeError=Error, CUDADriverError=Error, OutOfMemoryError=Error)
-    return SimpleNamespace(
-        cuda=SimpleNamespace(is_available=lambda: available, runtime=errors, driver=errors, memory=errors),
-        RawModule=RawModule,
-        asarray=_Array,
-    )
+    cuda = SimpleNamespace(is_available=lambda: available, runtime=errors, driver=errors, memory=errors)
+    return SimpleNamespace(cuda=cuda, RawModule=RawModule, asarray=_Array)

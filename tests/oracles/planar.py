@@ -189,16 +189,19 @@ class Multipliers:
         px, py, angle = casadi.vertsplit(self.pose(name))
         return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
 
+    def value(self, expression: Any, q: np.ndarray) -> np.ndarray:
+        """Return the values of an expression in the places of the bodies at places q; shape (n,)."""
+        return np.asarray(casadi.Function("value", [self.q], [expression])(q)).ravel()
+
     def residual(self, q: np.ndarray) -> float:
         """Return the largest closure error at places q."""
-        return float(np.abs(np.asarray(casadi.Function("c", [self.q], [self.closure])(q))).max(initial=0.0))
+        return float(np.abs(self.value(self.closure, q)).max(initial=0.0))
 
     def share(self, forces: dict[str, np.ndarray], q: np.ndarray, gear: Any, couple: float) -> None:
         """Replace the couple between two gears, as closure gives it, by a force at their pitch point; change the pin forces."""
         carrier = self.carrier(*gear.bodies)
         pins = [next(own for own, of in self.owners.items() if {carrier, body} <= set(of)) for body in gear.bodies]
-        places = [casadi.Function("p", [self.q], [casadi.vertcat(*self.at(carrier, own))])(q) for own in pins]
-        first, second = (np.asarray(place).ravel() for place in places)
+        first, second = (self.value(casadi.vertcat(*self.at(carrier, own)), q) for own in pins)
         if gear.ratio == 1.0:
             return
         pitch = first + gear.ratio / (gear.ratio - 1.0) * (second - first)
@@ -212,12 +215,9 @@ class Multipliers:
         """Replace the force on the block and the couple on the gear, as closure gives them, by a force at the pitch point."""
         pin, name, carrier = self.meshed(rack)
         s = self.d.slides[name]
-        angle = casadi.Function("a", [self.q], [self.pose(s.on)[2] + s.direction])
-        along = np.array([np.cos(float(angle(q))), np.sin(float(angle(q)))])
-        centre, block = (
-            np.asarray(casadi.Function("p", [self.q], [casadi.vertcat(*place)])(q)).ravel()
-            for place in (self.at(carrier, pin), casadi.vertsplit(self.pose(s.body))[:2])
-        )
+        angle = float(self.value(self.pose(s.on)[2] + s.direction, q)[0])
+        along = np.array([np.cos(angle), np.sin(angle)])
+        centre, block = self.value(casadi.vertcat(*self.at(carrier, pin)), q), self.value(self.pose(s.body)[:2], q)
         side = 1.0 if s.body == rack.rack else -1.0
         pitch = centre + side * rack.radius * np.array([along[1], -along[0]])
         arm = pitch - block
@@ -252,10 +252,9 @@ class Multipliers:
         points = {own: (next(acting), next(acting)) for own in self.loaded}
         forces = {name: next(acting) for name in self.pushed}
         turns = {name: next(acting) for name in self.d.springs}
-        jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
-        drift = casadi.jtimes(
-            casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
-        )
+        both = casadi.vertcat(self.closure, self.freedoms)
+        jacobian = casadi.jacobian(both, self.q)
+        drift = casadi.jtimes(casadi.jtimes(both, self.q, self.v), self.q, self.v)
         kinetic = casadi.SX(0)
         for n, name in enumerate(self.bodies):
             mass, _, inertia = self.mass(name)
@@ -309,7 +308,7 @@ class Multipliers:
         found = {}
         for name, value in self.d.friction.items():
             measure, slow = self.coordinate(name), FRICTION_RATE if name in self.owners else FRICTION_SPEED
-            along = np.asarray(casadi.Function("g", [self.q], [casadi.jacobian(measure, self.q)])(q)).ravel()
+            along = self.value(casadi.jacobian(measure, self.q), q)
             rub = -number(value) * float(np.tanh(along @ v / slow))
             found[name] = rub, rub * along
         return found
@@ -398,8 +397,7 @@ class Multipliers:
                 add(own, of[0], force)
                 add(own, body, -force)
         for name, slot in self.d.slots.items():
-            normal = casadi.Function("n", [self.q], [casadi.vertcat(*self.line(slot)[0])])(q)
-            x, y = np.asarray(normal).ravel()
+            x, y = self.value(casadi.vertcat(*self.line(slot)[0]), q)
             across, along = float(forces[name][0]), solution.friction.get(name, 0.0) + pulls.get(name, 0.0)
             add(slot.pin, self.owners[slot.pin][0], np.array([across * x + along * y, across * y - along * x]))
         return found

@@ -239,31 +239,24 @@ def test_published_set_is_the_printed_table(name: str) -> None:
     par = entry.parameters
     lengths = (par.ground_length, par.crank_length, par.coupler_length, par.rocker_length)
     assert lengths == pytest.approx([length * CM for length in table.lengths_cm], rel=1e-14)
-    assert (par.coupler_cog_distance, par.rocker_cog_distance) == pytest.approx(
-        (table.coupler_cog_cm * CM, table.rocker_cog_cm * CM), rel=1e-14
-    )
-    assert (par.coupler_mass, par.rocker_mass, par.slider_mass) == pytest.approx(
-        [mass * GRAM for mass in table.masses_g], rel=1e-14
-    )
-    assert par.coupler_inertia == pytest.approx(table.coupler_inertia_g_cm2 * G_CM2, rel=1e-14)
-    assert par.rocker_inertia == pytest.approx(table.rocker_inertia_g_cm2 * G_CM2, rel=1e-14)
-    assert par.crank_inertia == pytest.approx(published.CRANK_INERTIA_G_CM2 * G_CM2, rel=1e-14)
-    assert par.slider_stiffness == pytest.approx(table.stiffness_dyn_cm * DYN_PER_CM, rel=1e-14)
-    assert par.slider_damping == pytest.approx(table.damping_dyn_s_cm * DYN_S_PER_CM, rel=1e-14)
+    printed = {
+        "coupler_cog_distance": table.coupler_cog_cm * CM,
+        "rocker_cog_distance": table.rocker_cog_cm * CM,
+        **{f"{part}_mass": mass * GRAM for part, mass in zip(("coupler", "rocker", "slider"), table.masses_g)},
+        "coupler_inertia": table.coupler_inertia_g_cm2 * G_CM2,
+        "rocker_inertia": table.rocker_inertia_g_cm2 * G_CM2,
+        "crank_inertia": published.CRANK_INERTIA_G_CM2 * G_CM2,
+        "slider_stiffness": table.stiffness_dyn_cm * DYN_PER_CM,
+        "slider_damping": table.damping_dyn_s_cm * DYN_S_PER_CM,
+        # rig 2 lies in a horizontal plane
+        "gravity": 0.0 if name.startswith("rig-2") else published.GRAVITY_CM_S2 * CM,
+    }
+    assert {name: getattr(par, name) for name in printed} == pytest.approx(printed, rel=1e-14)
     assert par.crank_cog_distance == par.crank_mass == par.slider_guide_angle == par.slider_coulomb_friction == 0.0
     assert par.assembly_branch == 1
     assert entry.crank_speed == pytest.approx(table.speed_rpm * RPM, rel=1e-14)
     assert entry.initial == InitialState(crank_speed=entry.crank_speed)
     assert entry.source.startswith("Youssef")
-
-
-@pytest.mark.parametrize("name", published.TABLES)
-def test_gravity_of_the_published_sets(name: str) -> None:
-    # rig 2 lies in a horizontal plane
-    horizontal = name.startswith("rig-2")
-    assert SETS[name].parameters.gravity == pytest.approx(
-        0.0 if horizontal else published.GRAVITY_CM_S2 * CM, rel=1e-14
-    )
 
 
 # ------------------------------------------------------------------ published sets: Rahman's section 3.1
@@ -274,9 +267,8 @@ def test_gravity_of_the_published_sets(name: str) -> None:
 def test_published_set_is_the_data_of_section_3_1(offset_in: float, twist_deg: float) -> None:
     par = sets_3_1.parameters(offset_in, twist_deg)
     mass = POUND_FORCE / INCH  # lb.s2/in
-    assert (par.crank_length, par.rod_length, par.guide_offset) == pytest.approx(
-        (12.0 * INCH, 50.0 * INCH, offset_in * INCH), rel=1e-14
-    )
+    lengths = [12.0 * INCH, 50.0 * INCH, offset_in * INCH]
+    assert [par.crank_length, par.rod_length, par.guide_offset] == pytest.approx(lengths, rel=1e-14)
     assert par.guide_twist == pytest.approx(radians(twist_deg), rel=1e-15)
     masses = [m * mass for m in rahman.MASSES_LB_S2_IN]
     assert (par.crank_mass, par.rod_mass, par.slider_mass) == pytest.approx(masses, rel=1e-14)

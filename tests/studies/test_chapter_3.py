@@ -172,9 +172,8 @@ class TestFreeMotion:
     def test_release_at_another_angle_of_the_steady_motion(self, quarter: int) -> None:
         """A run at constant speed, sampled every quarter of a turn, passes through the state of the release."""
         speed = 14.0 * np.pi
-        steady = simulate(
-            runs.table_3_1(free_crank.STIFF), Inputs(speed=speed), stop_time=20.0 / 7.0 + 1.0 / 7.0, step=1.0 / 28.0
-        )
+        times = {"stop_time": 20.0 / 7.0 + 1.0 / 7.0, "step": 1.0 / 28.0}
+        steady = simulate(runs.table_3_1(free_crank.STIFF), Inputs(speed=speed), **times)
         free = free_crank.coast(free_crank.STIFF, release=0.5 * np.pi * quarter)
         assert free["crank.angle"][0] == pytest.approx(0.5 * np.pi * quarter)
         for name, tolerance in (("slider.position", 1e-6), ("slider.velocity", 1e-4)):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis import youssef
 from analysis.numerics.fourier import FourierSeries
 from analysis.studies.youssef.chapter_5 import SAME_GROUND, listed_boundaries, with_held_angles, with_same_ground
 from analysis.studies.youssef.damping import determinant_errors, equation_without_factor, orbit_removing_damper
@@ -20,15 +21,6 @@ from analysis.studies.youssef.regions import (
     first_order_region,
     hill_region,
     orbit_region,
-)
-from analysis.youssef import (
-    Form,
-    Variant,
-    boundary_stiffnesses,
-    hill_regions,
-    monodromy,
-    perturbed_region,
-    slider_equation,
 )
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
@@ -49,10 +41,10 @@ def test_listing_makes_the_region_about_two_and_a_half_times_too_wide(inertia_ra
 
 def test_the_printed_coefficients_make_the_region_four_times_too_wide() -> None:
     mechanism = chapter_4(1.0)
-    printed = first_order_region(mechanism, Variant.PRINTED)
+    printed = first_order_region(mechanism, youssef.Variant.PRINTED)
     assert printed.width / orbit_region(mechanism).width == pytest.approx(4.1, abs=0.1)
     # (5.16) against the determinant
-    by_hill = hill_region(mechanism, variant=Variant.PRINTED)
+    by_hill = hill_region(mechanism, variant=youssef.Variant.PRINTED)
     assert (printed.low, printed.high) == pytest.approx((by_hill.low, by_hill.high), abs=3e-5)
 
 
@@ -61,7 +53,7 @@ def test_without_the_rate_of_the_mass_the_region_is_four_times_too_wide(inertia_
     """The right equation less M' zeta' alone."""
     whole = equation(chapter_4(inertia_ratio))
     bare = replace(whole, b=FourierSeries.constant(0.0))
-    widths = [hill_regions(e, 1)[1].width for e in (bare, whole)]
+    widths = [youssef.hill_regions(e, 1)[1].width for e in (bare, whole)]
     assert widths[0] / widths[1] == pytest.approx(4.0, abs=0.01)
 
 
@@ -140,15 +132,15 @@ def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
 
 def test_formulas_of_the_perturbation_to_the_letter() -> None:
     """(5.16) and (5.24) to (5.26) with the coefficients of (4.29), whose h0 is 0."""
-    e = slider_equation(chapter_4(1.0), 60.0, variant=Variant.PRINTED, form=Form.SERIES)
+    e = youssef.slider_equation(chapter_4(1.0), 60.0, variant=youssef.Variant.PRINTED, form=youssef.Form.SERIES)
     zeroth, first, second = listed_boundaries(e)
     # (5.12) with its minus
     assert zeroth == pytest.approx(2 * (-2.605e-5,), abs=5.1e-9)
-    assert zeroth[0] == pytest.approx(boundary_stiffnesses(e.homogeneous(), 1, count=1)[0].real, rel=1e-3)
-    region = perturbed_region(e.homogeneous(), 1, order=1)
+    assert zeroth[0] == pytest.approx(youssef.boundary_stiffnesses(e.homogeneous(), 1, count=1)[0].real, rel=1e-3)
+    region = youssef.perturbed_region(e.homogeneous(), 1, order=1)
     assert region is not None
     assert (region.low, region.high) == pytest.approx(first, abs=1e-9)
-    region = perturbed_region(e.homogeneous(), 2)
+    region = youssef.perturbed_region(e.homogeneous(), 2)
     assert region is not None
     # the next order
     assert (region.low, region.high) == pytest.approx(second, abs=1e-5)
@@ -156,7 +148,7 @@ def test_formulas_of_the_perturbation_to_the_letter() -> None:
 
 def galerkin(inertia_ratio: float, harmonics: int) -> NDArray[np.float64]:
     """Return boundaries 1 and 3 in lambda_k^2 by (5.27) with four terms of half the crank angle, the coefficients cut."""
-    e = slider_equation(chapter_4(inertia_ratio), 60.0)
+    e = youssef.slider_equation(chapter_4(inertia_ratio), 60.0)
     x = np.linspace(0.0, 4.0 * np.pi, 512, endpoint=False)
 
     def cut(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -183,7 +175,7 @@ def test_cut_after_the_ninth_term() -> None:
 
 def test_by_determinant_of_the_divided_equation() -> None:
     """The third region needs the third harmonic of the coefficients, the fourth more terms."""
-    wholes = hill_regions(equation(chapter_4(1.0)), 3)
+    wholes = youssef.hill_regions(equation(chapter_4(1.0)), 3)
     for harmonics, first, third in ((2, 4.88e-5, 0.479), (64, 4.89e-5, 0.0281)):
         ends, errors = galerkin(1.0, harmonics).reshape(2, 2), determinant_errors(harmonics)
         for number, found, known in ((1, ends[0], first), (3, ends[1], third)):
@@ -197,23 +189,22 @@ def test_by_determinant_of_the_divided_equation() -> None:
 
 
 def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor() -> None:
-    found = slider_equation(chapter_4(1.5, 0.45), crank_speed(0.27))
-    whole = monodromy(found.homogeneous().stiffened(found.spring))
-    bare = monodromy(equation_without_factor(1.5, found.damping).stiffened(found.spring))
+    found = youssef.slider_equation(chapter_4(1.5, 0.45), crank_speed(0.27))
+    whole = youssef.monodromy(found.homogeneous().stiffened(found.spring))
+    bare = youssef.monodromy(equation_without_factor(1.5, found.damping).stiffened(found.spring))
     # (5.28): the determinant of the one is that of the factor, squared
     factor = np.sqrt(np.linalg.det(whole))
-    assert np.sort_complex(np.linalg.eigvals(whole)) == pytest.approx(
-        np.sort_complex(factor * np.linalg.eigvals(bare)), rel=1e-7
-    )
+    ours, right = np.linalg.eigvals(whole), factor * np.linalg.eigvals(bare)
+    assert np.sort_complex(ours) == pytest.approx(np.sort_complex(right), rel=1e-7)
 
 
 def test_zeroth_boundary_parts_a_stable_region_from_falling_away() -> None:
     exact = equation(chapter_4(1.0))
-    zeroth = boundary_stiffnesses(exact, 1, count=1)[0].real
-    below, above = (np.abs(np.linalg.eigvals(monodromy(exact.stiffened(x * zeroth)))).max() for x in (0.5, 1.5))
+    zeroth = youssef.boundary_stiffnesses(exact, 1, count=1)[0].real
+    below, above = (np.abs(np.linalg.eigvals(youssef.monodromy(exact.stiffened(x * zeroth)))).max() for x in (0.5, 1.5))
     assert below == pytest.approx(1.13041, abs=1e-5)
     assert above == pytest.approx(1.0, abs=1e-9)
     # the mean of K puts it above 0
     assert zeroth == pytest.approx(0.00081, abs=5e-6)
     bare = replace(exact, c=exact.c + (-exact.c.mean))
-    assert boundary_stiffnesses(bare, 1, count=1)[0].real < 0.0
+    assert youssef.boundary_stiffnesses(bare, 1, count=1)[0].real < 0.0

@@ -108,9 +108,8 @@ def test_no_other_digit_in_a_single_place_gives_the_stated_error(name: str) -> N
             if not values[k]:
                 continue
             vector, steps = np.array(values) * unit, np.diag(half_units(p.linkage))
-            found, *changed = (
-                p.linkage_error(Linkage.from_vector(x, 1)) for x in (vector, *(vector + steps), *(vector - steps))
-            )
+            vectors = (vector, *(vector + steps), *(vector - steps))
+            found, *changed = (p.linkage_error(Linkage.from_vector(x, 1)) for x in vectors)
             if np.isfinite(found):
                 reach = 0.5 * float(np.abs(np.subtract(*np.split(np.array(changed), 2))).sum())
                 assert abs(found - p.error) > tolerance + reach, (k, values[k], found)
@@ -198,9 +197,8 @@ class TestSearch:
                 assert away @ away == pytest.approx(expected, rel=1e-9)
             assert search.error(self.vector(linkage)) == pytest.approx(min(sides), rel=1e-9)
         other = PROBLEMS["ellipse-b"]
-        assert search.error(self.vector(other.linkage), semi_axis=15.0) == pytest.approx(
-            other.linkage_error(other.linkage), rel=1e-9
-        )
+        error = other.linkage_error(other.linkage)
+        assert search.error(self.vector(other.linkage), semi_axis=15.0) == pytest.approx(error, rel=1e-9)
 
     def test_its_rocker_error_is_that_of_the_package(self) -> None:
         p = PROBLEMS["rocker"]

@@ -8,22 +8,8 @@ import pytest
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import best_spring, inverse_dynamics
-from analysis.studies.youssef import chapter_7, control, series_1
+from analysis.studies.youssef import chapter_7, control, series_1, series_2
 from analysis.studies.youssef.problems import PROBLEMS
-from analysis.studies.youssef.series_2 import (
-    PATH,
-    PATH_SEARCHES,
-    ROCKER,
-    error_range,
-    linkage_error,
-    mended_path_linkage,
-    out_of_reach,
-    path_motion,
-    printed_linkage,
-    readings,
-    rocker_motion,
-    slider,
-)
 from analysis.synthesis import Linkage, MachineSpec, SecondCrank, SliderMotion
 from analysis.youssef import accessible_area
 from linkwork.five_bar import kinematics
@@ -59,17 +45,17 @@ class TestControl:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [ROCKER, PATH])
+@pytest.mark.parametrize("name", [series_2.ROCKER, series_2.PATH])
 def test_no_second_crank_nearby_is_better(name: str) -> None:
     """Another length or phase, or another ratio of the gears, of the crank that moves the rocker pivot."""
     found = control.with_second_crank(name)
     assert isinstance(found.pivot, SecondCrank)
-    least = linkage_error(name, found)
-    assert least < linkage_error(name, PROBLEMS[name].linkage)
+    least = series_2.linkage_error(name, found)
+    assert least < series_2.linkage_error(name, PROBLEMS[name].linkage)
     others = [replace(found.pivot, ratio=ratio) for ratio in control.GEARS if ratio != found.pivot.ratio]
     for factor, turned in ((0.95, 0.0), (1.05, 0.0), (1.0, -0.05), (1.0, 0.05)):
         others.append(replace(found.pivot, length=factor * found.pivot.length, phase=found.pivot.phase + turned))
-    assert all(linkage_error(name, replace(found, pivot=pivot)) > least for pivot in others)
+    assert all(series_2.linkage_error(name, replace(found, pivot=pivot)) > least for pivot in others)
 
 
 def test_cam() -> None:
@@ -93,7 +79,7 @@ ROCKER_BEST = {1: 2.334, 2: 0.7221, 3: 0.4896}
 
 def by_the_plant(linkage: Linkage, phi: float, u: float, guide: float) -> tuple[complex, float]:
     """P in the plane (m) and the rocker's angle (rad), by `linkwork.five_bar.kinematics` alone."""
-    fixed = replace(linkage, pivot=SliderMotion(slider(linkage).series, guide) if linkage.pivot else None)
+    fixed = replace(linkage, pivot=SliderMotion(series_2.slider(linkage).series, guide) if linkage.pivot else None)
     p = replace(MachineSpec().sliding_five_bar(fixed), slider_guide_angle=guide).constants()
     g = kinematics.position(phi + linkage.crank_phase, u, p)
     place = complex(linkage.pivot_x, linkage.pivot_y)
@@ -106,7 +92,7 @@ def weighted_error(linkage: Linkage) -> float:
     total = 0.0
     for k in range(24):
         phi = 2.0 * pi * k / 24
-        motion = slider(linkage)
+        motion = series_2.slider(linkage)
         _, angle = by_the_plant(linkage, phi, float(motion.series(phi)), motion.guide_angle)
         off = np.degrees(angle) - (70.0 + 100.0 * abs(sin(0.5 * phi)))
         weight = 1000.0 if 60 <= 15 * k <= 260 else 1.0
@@ -118,7 +104,7 @@ def area(linkage: Linkage) -> float:
     """Area between coupler curve and ellipse (cm2), both as 720-gons: neither crosses itself."""
     from shapely import Polygon
 
-    motion = slider(linkage)
+    motion = series_2.slider(linkage)
     t = np.linspace(0.0, 2.0 * pi, 720, endpoint=False)
     points = [by_the_plant(linkage, phi, float(motion.series(phi)), motion.guide_angle)[0] for phi in t.tolist()]
     curve = Polygon([(100.0 * z.real, 100.0 * z.imag) for z in points])
@@ -133,77 +119,79 @@ class TestGoals:
 
     @pytest.mark.parametrize("harmonics", ROCKER_BEST)
     def test_the_angle_is_the_best_known(self, harmonics: int) -> None:
-        error = linkage_error(ROCKER, rocker_motion(harmonics).linkage)
-        assert weighted_error(rocker_motion(harmonics).linkage) == pytest.approx(error, rel=1e-9)
+        error = series_2.linkage_error(series_2.ROCKER, series_2.rocker_motion(harmonics).linkage)
+        assert weighted_error(series_2.rocker_motion(harmonics).linkage) == pytest.approx(error, rel=1e-9)
         assert error <= ROCKER_BEST[harmonics]
 
     def test_defects_and_strokes(self) -> None:
-        motions = [rocker_motion(n) for n in (1, 2, 3)] + [path_motion(n) for n in PATH_SEARCHES]
+        motions = [series_2.rocker_motion(n) for n in (1, 2, 3)] + [
+            series_2.path_motion(n) for n in series_2.PATH_SEARCHES
+        ]
         assert all(s.verdicts.sound for s in motions)
         assert min(s.linkage.least_transmission for s in motions[:3]) > np.radians(20.0)
-        for n, (_, stroke) in PATH_SEARCHES.items():
-            assert slider(path_motion(n).linkage).stroke <= 1.001 * stroke
-        assert slider(path_motion(2).linkage).stroke < 0.036
+        for n, (_, stroke) in series_2.PATH_SEARCHES.items():
+            assert series_2.slider(series_2.path_motion(n).linkage).stroke <= 1.001 * stroke
+        assert series_2.slider(series_2.path_motion(2).linkage).stroke < 0.036
 
     @pytest.mark.parametrize("harmonics", PATH_GOAL)
     def test_the_path(self, harmonics: int) -> None:
-        error = linkage_error(PATH, path_motion(harmonics).linkage)
+        error = series_2.linkage_error(series_2.PATH, series_2.path_motion(harmonics).linkage)
         assert error <= PATH_GOAL[harmonics]
         # the study's curve is a 360-gon, this one a 720-gon
-        assert area(path_motion(harmonics).linkage) == pytest.approx(error, abs=0.03)
-        assert slider(path_motion(harmonics).linkage).series.order == harmonics
+        assert area(series_2.path_motion(harmonics).linkage) == pytest.approx(error, abs=0.03)
+        assert series_2.slider(series_2.path_motion(harmonics).linkage).series.order == harmonics
 
     def test_a_stroke_beyond_the_limit_reaches_less(self) -> None:
         series = FourierSeries(np.array([1.005, 15.748, -2.555]) / 100.0, np.array([0.0, 27.293, 1.024]) / 100.0)
-        longer = replace(PROBLEMS[PATH].linkage, pivot=SliderMotion(series, 0.163))
-        assert slider(longer).stroke > PATH_SEARCHES[2][1]
-        assert area(longer) < linkage_error(PATH, path_motion(2).linkage) / 1.1
-        assert area(longer) == pytest.approx(linkage_error(PATH, longer), abs=0.03)
+        longer = replace(PROBLEMS[series_2.PATH].linkage, pivot=SliderMotion(series, 0.163))
+        assert series_2.slider(longer).stroke > series_2.PATH_SEARCHES[2][1]
+        assert area(longer) < series_2.linkage_error(series_2.PATH, series_2.path_motion(2).linkage) / 1.1
+        assert area(longer) == pytest.approx(series_2.linkage_error(series_2.PATH, longer), abs=0.03)
 
     def test_the_links_are_the_printed_ones(self) -> None:
         for name, motions in (
-            (ROCKER, [rocker_motion(n) for n in (1, 2, 3)]),
-            (PATH, [path_motion(n) for n in (2, 3, 5)]),
+            (series_2.ROCKER, [series_2.rocker_motion(n) for n in (1, 2, 3)]),
+            (series_2.PATH, [series_2.path_motion(n) for n in (2, 3, 5)]),
         ):
             for found in motions:
                 assert found.linkage.values() == pytest.approx(PROBLEMS[name].linkage.values(), rel=1e-12)
 
     def test_no_motion_traces_what_is_out_of_reach(self) -> None:
         # P is l2 + r from A at most: at each y the ellipse ends at the right, and the reach is left of that or not
-        k = PROBLEMS[PATH].linkage
+        k = PROBLEMS[series_2.PATH].linkage
         y = np.linspace(0.10, 0.20, 200_001)
         half = 0.15 * np.sqrt(np.clip(1.0 - ((y - 0.15) / 0.05) ** 2, 0.0, None))
         reach = k.pivot_x + np.sqrt((k.crank_length + k.point_distance) ** 2 - (y - k.pivot_y) ** 2)
         beyond = np.clip(0.20 + half - np.maximum(reach, 0.20 - half), 0.0, None)
-        assert out_of_reach() == pytest.approx(1e4 * beyond.mean() * 0.10, abs=1e-5)
+        assert series_2.out_of_reach() == pytest.approx(1e4 * beyond.mean() * 0.10, abs=1e-5)
 
 
 class TestPrintedSeries:
     """The two series of the slider that the thesis prints."""
 
     def test_path_b_with_a_tenth_of_its_mean_has_the_printed_area(self) -> None:
-        linkage = mended_path_linkage()
-        motion = slider(linkage)
+        linkage = series_2.mended_path_linkage()
+        motion = series_2.slider(linkage)
         assert 100.0 * motion.series.cos == pytest.approx([0.31, 0.772, 0.568])
         assert 100.0 * motion.series.sin == pytest.approx([0.0, -0.34, -0.136])
         assert np.degrees(motion.guide_angle) == pytest.approx(-0.9)
-        least, greatest = error_range(PATH, linkage)
+        least, greatest = series_2.error_range(series_2.PATH, linkage)
         assert least < area(linkage) < greatest
         # by trying the corners of the rounding one after another, with an area by polygons of shapely
         assert (least, greatest) == pytest.approx((3.933, 4.756), abs=2e-3)
 
     def test_the_argument_of_the_series_may_be_the_crank_angle(self) -> None:
-        k = PROBLEMS[ROCKER].linkage
+        k = PROBLEMS[series_2.ROCKER].linkage
         phi = np.linspace(0.0, 2.0 * pi, 9)
         th2 = phi + k.crank_phase
         wanted = 1.46 - 0.425 * np.cos(th2) - 0.256 * np.sin(th2) - 0.855 * np.cos(2 * th2) + 0.569 * np.sin(2 * th2)
-        series = slider(printed_linkage(ROCKER, turned=k.crank_phase)).series
+        series = series_2.slider(series_2.printed_linkage(series_2.ROCKER, turned=k.crank_phase)).series
         assert 100.0 * series(phi) == pytest.approx(wanted)
 
     def test_no_reading_of_the_rockers_comes_near_to_its_error(self) -> None:
-        best = readings(ROCKER)[0]
-        least, greatest = error_range(ROCKER, best)
-        assert 8.0 * 4.8 < least < linkage_error(ROCKER, best) < greatest
+        best = series_2.readings(series_2.ROCKER)[0]
+        least, greatest = series_2.error_range(series_2.ROCKER, best)
+        assert 8.0 * 4.8 < least < series_2.linkage_error(series_2.ROCKER, best) < greatest
 
 
 class TestSeries1:
@@ -211,7 +199,7 @@ class TestSeries1:
 
     def test_the_error_by_the_plant(self) -> None:
         found = series_1.search_directly()
-        motion = slider(found.linkage)
+        motion = series_2.slider(found.linkage)
         points = [by_the_plant(found.linkage, t, float(motion.series(t)), 0.0)[0] for t in series_1.ROTATION.tolist()]
         assert (np.abs(np.array(points) - series_1.desired_points()) ** 2).sum() == pytest.approx(found.error, rel=1e-9)
 
@@ -221,9 +209,8 @@ class TestSeries1:
         assert 0 < upright.sum() < len(upright)
         near_by = series_1.variational().u[:, None] + np.array([-1e-6, 0.0, 1e-6])
         assert np.abs(u - 1.0 - near_by[:, [1]]).min(axis=1).max() < 1e-9
-        errors = np.array(
-            [np.abs(chapter_7.coupler_point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)]
-        )
+        points = [chapter_7.coupler_point(series_1.ROTATION, near_by[:, k]) for k in range(3)]
+        errors = np.abs(np.array(points) - targets) ** 2
         assert np.abs(errors[2] - errors[0]).max() / 2e-6 < 1e-5
 
     def test_tangents_are_vertical_where_the_coupler_ceases_to_point_at_the_target(self) -> None:
@@ -275,9 +262,8 @@ class TestSeries1:
 
     @pytest.mark.slow
     def test_a_weight_moves_error_out_of_p1_p2(self) -> None:
-        (inside, outside), (even, rest) = map(
-            series_1.squared_errors, (series_1.search_directly(5.0), series_1.search_directly())
-        )
+        found = (series_1.search_directly(5.0), series_1.search_directly())
+        (inside, outside), (even, rest) = map(series_1.squared_errors, found)
         assert inside < even
         assert outside > rest
 

@@ -440,10 +440,8 @@ class TestMethod:
     )
     def test_share_of_poor_starts_at_which_rounding_decides(self, cases: tuple[Case, ...], share: float) -> None:
         poor = (-120.0, -60.0, 60.0, 120.0, 180.0)
-        one, other = (
-            np.concatenate([found.settled for found in iteration.endings(cases, tuple(x + off for x in poor))])
-            for off in (0.0, 1e-10)
-        )
+        starts = (tuple(x + off for x in poor) for off in (0.0, 1e-10))
+        one, other = (np.concatenate([found.settled for found in iteration.endings(cases, start)]) for start in starts)
         assert np.mean(one != other) == pytest.approx(share, abs=0.02)
         # by the rounding of another machine it is 0.021
         assert np.mean(one) == pytest.approx(np.mean(other), abs=0.03)
@@ -518,9 +516,8 @@ class TestMethod:
     def test_a_loop_that_is_open_meets_eqs_22(self) -> None:
         b = closure._rotation_solving_22()
         assert b @ b.T == pytest.approx(np.eye(3), abs=1e-12)
-        assert [b[1, 0] + b[0, 0] + b[1, 1], b[2, 0] + b[0, 0] + b[2, 2], b[2, 1] + b[1, 1] + b[2, 2]] == pytest.approx(
-            [2.0] * 3, abs=1e-12
-        )
+        sums = [b[1, 0] + b[0, 0] + b[1, 1], b[2, 0] + b[0, 0] + b[2, 2], b[2, 1] + b[1, 1] + b[2, 2]]
+        assert sums == pytest.approx([2.0] * 3, abs=1e-12)
         assert np.degrees(np.arccos(0.5 * (np.trace(b) - 1.0))) == pytest.approx(45.37, abs=0.005)
 
     def test_both_mended_the_planar_forces_are_the_plants(self) -> None:

@@ -17,6 +17,7 @@ from analysis.systems import COUPLINGS, End, JoinedSystem, System, SystemRun, co
 from analysis.systems.description import PartTable
 from analysis.systems.wiring import WiringError
 from linkwork.errors import InputError, UnknownNameError
+from tests.refusals import refused
 
 from .conftest import system_of, wiring_of
 
@@ -218,11 +219,8 @@ def test_a_refused_step_ends_the_run_and_keeps_what_was_there(coupling: str) -> 
     system = system_of("slider-tracking")
     far = {**system.parts["reference"].values, "motion_cos_2": "500 mm"}
     strong = {**system.parts["controller"].values, "limit": "100 kN"}
-    parts = {
-        **system.parts,
-        "reference": replace(system.parts["reference"], values=far),
-        "controller": replace(system.parts["controller"], values=strong),
-    }
+    given = {"reference": far, "controller": strong}
+    parts = system.parts | {name: replace(system.parts[name], values=values) for name, values in given.items()}
     run = run_system(replace(system, parts=parts).wiring(), coupling=coupling)
     assert run.status == 3
     assert "linkage refused the step from t = " in run.message
@@ -245,17 +243,12 @@ def test_steps_that_do_not_fill_the_run_end_with_a_shorter_one(step: float, monk
 
 def test_wrong_arguments_are_refused() -> None:
     wiring = wiring_of("motor-crank")
-    with pytest.raises(UnknownNameError, match="rollback"):
-        run_system(wiring, coupling="roll")
-    with pytest.raises(InputError, match=r"wiring is System: give .*wiring\(\)"):
-        run_system(system_of("motor-crank"))
+    refused(UnknownNameError, "rollback", run_system, wiring, coupling="roll")
+    refused(InputError, r"wiring is System: give .*wiring\(\)", run_system, system_of("motor-crank"))
     for step, stop_time in ((2.0, 1.0), (0.0, 1.0), (1e-3, inf)):
-        with pytest.raises(InputError, match="communication step"):
-            run_system(wiring, step=step, stop_time=stop_time)
-    with pytest.raises(InputError, match="does not divide"):
-        convergence(system_of("motor-crank"), [1e-3, 4e-4], stop_time=0.1)
-    with pytest.raises(InputError, match="the system has 0 power bonds"):
-        run_system(wiring_of("slider-tracking"), share=1e-3)
+        refused(InputError, "communication step", run_system, wiring, step=step, stop_time=stop_time)
+    refused(InputError, "does not divide", convergence, system_of("motor-crank"), [1e-3, 4e-4], stop_time=0.1)
+    refused(InputError, "the system has 0 power bonds", run_system, wiring_of("slider-tracking"), share=1e-3)
     with pytest.raises(UnknownNameError):
         run_system(wiring, step=1e-3, stop_time=1e-2)["linkage.crank.sped"]
 

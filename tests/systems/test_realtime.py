@@ -70,11 +70,8 @@ def with_a_table(values: dict[str, Any]) -> System:
 def test_a_table_as_feed_forward_is_a_list_and_is_the_same_in_c(tmp_path: Path) -> None:
     series = wiring_of("slider-tracking").parts["reference"].values
     degrees = np.arange(0.0, 360.0, 5.0)
-    forces = sum(
-        series.get(f"load_{kind}_{n}", 0.0) * of(n * np.radians(degrees))
-        for n in range(1, 7)
-        for kind, of in (("cos", np.cos), ("sin", np.sin))
-    )
+    terms = [(n, kind, of) for n in range(1, 7) for kind, of in (("cos", np.cos), ("sin", np.sin))]
+    forces = sum(series.get(f"load_{kind}_{n}", 0.0) * of(n * np.radians(degrees)) for n, kind, of in terms)
     table = [f"{force + series['load_0']} N" for force in forces]
     wiring = with_a_table({"sample_time": "0.5 ms", "table": table}).wiring()
     check_same(run_host(build_host(wiring, tmp_path), 2000), wiring)

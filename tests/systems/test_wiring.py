@@ -65,11 +65,7 @@ def test_names_need_no_quotation_marks(tmp_path: Path) -> None:
         ({"linkage__drive__torque": "motor.rotor.speed"}, WiringError, "rad/s and N.m; they must be the same"),
         ({"linkage__drive__torque": "motor.rotor.inertia"}, WiringError, "causality parameter, it must be an output"),
         ({"linkage__crank__speed": "motor.rotor.speed"}, WiringError, "is of causality output, it must be an input"),
-        (
-            {"linkage__drive__speed": "motor.rotor.speed"},
-            WiringError,
-            "drive.torque and drive.speed are both connected: only one may drive crank.angle",
-        ),
+        ({"linkage__drive__speed": "motor.rotor.speed"}, WiringError, "connected: only one may drive crank.angle"),
         ({"linkage__drive__torq": "motor.shaft.exerted_torque"}, UnknownNameError, r"did you mean drive\.torque"),
         ({"linkage__drive__torque": "engine.shaft.exerted_torque"}, UnknownNameError, "motor"),
     ],
@@ -109,18 +105,13 @@ def test_notes_name_what_is_not_connected_and_loops() -> None:
     assert not any("loop" in note for name in library() for note in wiring_of(name).notes())
     # an output of a crank at commanded speed that sets that speed's own rate
     own = wired("slider-tracking", linkage__drive__acceleration="linkage.crank.acceleration").wiring()
-    assert any(
-        "algebraic loop linkage.crank.acceleration -> linkage.crank.acceleration" in note for note in own.notes()
-    )
+    assert any("loop linkage.crank.acceleration -> linkage.crank.acceleration" in note for note in own.notes())
 
 
 def test_loops_of_parts_in_which_everything_depends_on_everything_are_found_soon() -> None:
     """There are 10^8 loops, as between FMUs of other tools that list no dependencies."""
-    ports = {
-        f"{way}{n}": Port(f"{way}{n}", n, causality, "Real", "", "", False)
-        for way, causality in (("u", "input"), ("y", "output"))
-        for n in range(8)
-    }
+    ways = [(way, causality, n) for way, causality in (("u", "input"), ("y", "output")) for n in range(8)]
+    ports = {f"{way}{n}": Port(f"{way}{n}", n, causality, "Real", "", "", False) for way, causality, n in ways}
     inputs = tuple(name for name in ports if name.startswith("u"))
     feeds = {name: inputs for name in ports if name.startswith("y")}
     common: dict[str, Any] = {"fmu": Path(), "ports": ports, "values": {}, "feeds": feeds}
@@ -177,11 +168,9 @@ def test_an_input_of_a_case_that_varies_is_refused_unless_something_takes_its_pl
     assert (held["drive.mode"], held["drive.speed"]) == (1.0, 3.0)
     pushed = System(parts={"a": replace(part, values={"drive.torque": "2 N*m"})}, folder=tmp_path).members["a"].values
     assert (pushed["drive.mode"], pushed["drive.torque"]) == (0.0, 2.0)
-    motor = System(
-        parts={"a": part, "motor": PartTable(partner="induction-motor")},
-        connections={End("a", "drive.torque"): End("motor", "shaft.exerted_torque")},
-        folder=tmp_path,
-    )
+    parts = {"a": part, "motor": PartTable(partner="induction-motor")}
+    wires = {End("a", "drive.torque"): End("motor", "shaft.exerted_torque")}
+    motor = System(parts=parts, connections=wires, folder=tmp_path)
     assert motor.members["a"].values["drive.mode"] == 0.0
 
 
@@ -444,10 +433,8 @@ def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
     start, end = text.index('<ssd:Component name="linkage"'), text.index("</ssd:Elements>")
     ports = (("drive.torque", "turn", "input"), ("crank.speed", "w", "output"), ("crank.acceleration", "a", "output"))
     edges = [f'<ssd:Connector name="{edge}" kind="{kind}"/>' for _, edge, kind in (*ports, ("", "push", "input"))]
-    inside = [
-        f'<ssd:Connection startElement="linkage" startConnector="{port}" endConnector="{edge}"/>'
-        for port, edge, _ in ports
-    ]
+    wire = '<ssd:Connection startElement="linkage" startConnector='
+    inside = [f'{wire}"{port}" endConnector="{edge}"/>' for port, edge, _ in ports]
     own = bindings(("", parameters(push='<ssv:Real value="3"/>', linkage__slider__damping='<ssv:Real value="5"/>'), ""))
     whole = bindings(("", parameters(machine__linkage__slider__damping='<ssv:Real value="7"/>'), ""))
     inner = (
@@ -471,9 +458,8 @@ def test_parts_of_systems_inside_a_system_are_parts(tmp_path: Path) -> None:
     )
     entries["SystemStructure.ssd"] = text.replace('<ssd:System name="system">', top).encode()
     wiring, flat = read_ssp(archived(tmp_path / "nested.ssp", entries)), wiring_of("motor-crank")
-    assert {str(t).replace("machine_", ""): str(s).replace("machine_", "") for t, s in wiring.connections.items()} == {
-        str(t): str(s) for t, s in flat.connections.items()
-    }
+    named = {str(t).replace("machine_", ""): str(s).replace("machine_", "") for t, s in wiring.connections.items()}
+    assert named == {str(t): str(s) for t, s in flat.connections.items()}
     values = dict(flat.parts["linkage"].values) | {"slider.force": 3.0, "slider.damping": 7.0}
     assert values_of(wiring) == {"motor": dict(flat.parts["motor"].values), "machine_linkage": values}
     assert run_system(wiring, stop_time=2e-3).status == 0

@@ -31,13 +31,9 @@ class Parameters(CheckedParameters):
         """Return the constants of the equations."""
         m, r = self.rotor_mass, self.rotor_radius
         return Constants(
-            self.rotor_inertia + m * r * r,
-            m * r,
-            self.cart_mass + m,
-            self.cart_stiffness,
-            self.cart_damping,
+            self.rotor_inertia + m * r * r, m * r, self.cart_mass + m, self.cart_stiffness, self.cart_damping,
             m * self.gravity * r,
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,10 +101,7 @@ MECHANISM = Mechanism(
         CRANK._replace(coordinate="rotor.angle", rate="rotor.speed", initial=("rotor_angle", "rotor_speed")),
         Freedom("cart.position", "cart.velocity", ("cart_position", "cart_velocity")),
     ),
-    channels=(
-        *CRANK_CHANNELS,
-        Channel("cart.force", "force", freedom=1),
-    ),
+    channels=(*CRANK_CHANNELS, Channel("cart.force", "force", freedom=1)),
     variables=VARIABLES,
     position_parameters=("initial.rotor_angle", "initial.cart_position"),
     experiment=(0.0, 1.0, 1e-3, 1e-9),

@@ -34,14 +34,9 @@ class Parameters(CheckedParameters):
     def constants(self) -> Constants:
         """Return the constants of the equations. `astuple` would not do: traced parameters are no dataclass."""
         return Constants(
-            self.rotor_inertia,
-            self.rotor_damping,
-            self.rotor_stiffness,
-            self.rotor_cubic_stiffness,
-            self.rotor_modulation,
-            self.rotor_weight,
-            self.rotor_excitation,
-        )
+            self.rotor_inertia, self.rotor_damping, self.rotor_stiffness, self.rotor_cubic_stiffness,
+            self.rotor_modulation, self.rotor_weight, self.rotor_excitation,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,14 +35,9 @@ class Parameters(CheckedParameters):
         """
         m1, r1, m2, r2 = self.left_mass, self.left_radius, self.right_mass, self.right_radius
         return Constants(
-            11.0 * m1 * r1 * r1,
-            11.0 * m2 * r2 * r2,
-            m1 * r1,
-            m2 * r2,
-            self.cart_mass + m1 + m2,
-            self.cart_stiffness,
+            11.0 * m1 * r1 * r1, 11.0 * m2 * r2 * r2, m1 * r1, m2 * r2, self.cart_mass + m1 + m2, self.cart_stiffness,
             self.cart_damping,
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,14 +53,9 @@ class Initial(CheckedState):
 
 
 _DEMO = Parameters(
-    left_mass=0.2,
-    left_radius=0.05,
-    right_mass=0.1,
-    right_radius=0.06,
-    cart_mass=4.0,
-    cart_stiffness=3000.0,
+    left_mass=0.2, left_radius=0.05, right_mass=0.1, right_radius=0.06, cart_mass=4.0, cart_stiffness=3000.0,
     cart_damping=12.0,
-)
+)  # fmt: skip
 _SPEEDS = {"left": 20.0, "right": 30.0}
 
 
