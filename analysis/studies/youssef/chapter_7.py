@@ -104,8 +104,9 @@ def family() -> StudyResult:
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 "7.0, L5203",
                 f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2) "
-                f"for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3: the greatest at the {PRECISION} precision points, where "
-                "u = 0 (all our choice); then the greatest between each two of them, of which the least is listed",
+                f"for a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (all our choice): the greatest at the {PRECISION} "
+                "precision points, where u = 0; then the greatest over all a in each interval between two of them, of which "
+                "the least is listed",
                 f"1e-12 l3, for rounding errors; more than {READ:g} l3, the accuracy to which a graph can be read",
                 at_most("at the precision points", 1e-12, kept, "l3"),
                 at_least("between the precision points", READ, changed, "l3"),

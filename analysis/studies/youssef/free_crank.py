@@ -326,8 +326,8 @@ def soft_phase_plane() -> StudyResult:
             "a drift towards u=[0], is noticeable.",
             "3.3, L2276-2287",
             "range of u and u' and distance of the mean of u from 0, relative to the turn before: the greatest values from "
-            "the fourth turn on (our choice), since the release causes a transient. Then the drift of the mean of u over "
-            "the turns drawn, relative to the greatest range of u in a turn",
+            "the fourth turn on (our choice), since the release causes a transient. Then the drift, which is the range of "
+            "the mean of u over the turns drawn, relative to the greatest range of u in a turn",
             f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
             *tending,
             *drifts,
@@ -336,8 +336,8 @@ def soft_phase_plane() -> StudyResult:
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
             "of oscillation further away from u=[0].",
             "3.3, L2287-2293",
-            "drift of the mean of u over the turns drawn, and distance of this mean from 0 in the first turn, relative to "
-            "those with k = 2e6 dyn/cm",
+            "drift, as in the row before, and distance of the mean of u from 0 in the first turn, relative to those with k = "
+            "2e6 dyn/cm",
             SIGN,
             at_least("drift", 1.0, drift),
             at_least("distance", 1.0, distance),

@@ -34,7 +34,7 @@ from ..statements import FloatArray
 from ..study import StudyResult
 from ..variation import cache, vary
 
-LOST = "the measured curve is lost with the figure"
+LOST = "the measured curves are lost with the figures"
 #: Relative rise of the amplitude up to which no one notices it on a graph.
 NOTICED = ALIKE
 SEEN_IN_RECORDS = (
