@@ -17,12 +17,8 @@ from linkwork.errors import LinkworkError
 class MissingLibraryError(LinkworkError, ImportError):
     """Error for a library that is not installed; the message has the command that installs it.
 
-    Attributes
-    ----------
-    requirement : str
-        Requirement for pip, such as ``plotly>=5.24``.
-    extra : str
-        Linkwork's extra that the library belongs to; empty for a library of the core.
+    ``requirement`` is the requirement for pip, such as ``plotly>=5.24``; ``extra`` is Linkwork's extra that the library belongs
+    to, empty for a library of the core.
     """
 
     def __init__(self, library: str) -> None:
@@ -34,10 +30,7 @@ class MissingLibraryError(LinkworkError, ImportError):
 def require(*libraries: str) -> None:
     """Check that libraries are installed, without importing them; a module such as ``lxml.etree`` stands for its library.
 
-    Raises
-    ------
-    MissingLibraryError
-        For the first library that is not installed.
+    Raises MissingLibraryError for the first library that is not installed.
     """
     for library in (name.partition(".")[0] for name in libraries):
         if find_spec(library) is None:

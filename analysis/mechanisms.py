@@ -32,10 +32,7 @@ class MechanismError(LinkworkError):
 def check(mechanism: Mechanism) -> None:
     """Check that the parts of a mechanism are consistent.
 
-    Raises
-    ------
-    MechanismError
-        If the parts are inconsistent; the message states the first fault.
+    Raises MechanismError if the parts are inconsistent; the message states the first fault.
     """
     # later checks assume that earlier ones found no fault
     for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations, _faults_of_drawing):
@@ -46,10 +43,7 @@ def check(mechanism: Mechanism) -> None:
 def register(mechanism: Mechanism) -> None:
     """Make a mechanism known to the analyses, case files and the command line.
 
-    Raises
-    ------
-    MechanismError
-        If its parts are inconsistent, or another mechanism has its name or the name of its FMU.
+    Raises MechanismError if its parts are inconsistent, or another mechanism has its name or the name of its FMU.
     """
     check(mechanism)
     for other in MECHANISMS.values():
@@ -225,10 +219,7 @@ def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
 def find_mechanism(parameters: Parameters) -> Mechanism:
     """Return the mechanism to which parameters belong.
 
-    Raises
-    ------
-    InputError
-        If the parameters belong to no known mechanism.
+    Raises InputError if the parameters belong to no known mechanism.
     """
     for mechanism in MECHANISMS.values():
         if isinstance(parameters, mechanism.parameters):

@@ -28,10 +28,7 @@ DENSITIES: Mapping[str, float] = MappingProxyType({"steel": 7850.0, "aluminium":
 def density(value: Amount, name: str = "density") -> float:
     """Return a density (kg/m3) from a number, a text such as ``"7.85 g/cm3"``, or a material of `DENSITIES`.
 
-    Raises
-    ------
-    ParameterError
-        If the value is neither a positive density nor a known material.
+    Raises ParameterError if the value is neither a positive density nor a known material.
     """
     if isinstance(value, str) and value in DENSITIES:
         return DENSITIES[value]
@@ -105,12 +102,7 @@ class Rod(_Profile):
 class Tube(_Profile):
     """A round tube: moment of inertia m (3 (ro^2 + ri^2) + L^2)/12.
 
-    Attributes
-    ----------
-    outer, inner : float
-        Diameters (m); the inner one must be less.
-    density : float
-        Density (kg/m3), or the name of a material.
+    ``outer`` and ``inner`` are its diameters (m), the inner one less; ``density`` is in kg/m3, or the name of a material.
     """
 
     outer: Amount
@@ -133,12 +125,8 @@ class Tube(_Profile):
 class Bar(_Profile):
     """A rectangular bar: moment of inertia m (L^2 + w^2)/12 about an axis normal to the plane of motion.
 
-    Attributes
-    ----------
-    width, thickness : float
-        Width in the plane of motion, and thickness normal to that plane (m).
-    density : float
-        Density (kg/m3), or the name of a material.
+    ``width`` is in the plane of motion, ``thickness`` normal to that plane (m); ``density`` is in kg/m3, or the name of a
+    material.
     """
 
     width: Amount
@@ -172,20 +160,13 @@ class Plate(_Section):
     density: Amount
 
     def properties(self, points: ArrayLike) -> MassProperties:
-        """Return mass, centre of mass and moment of inertia of a plate with the given corners.
+        """Return mass, centre of mass and moment of inertia of a plate with the given corners (m), shape (n, 2), n >= 3.
 
-        By Green's theorem the integrals over the area become sums over the edges: C. Steger, On the calculation of arbitrary
-        moments of polygons, report FGBV-96-05, TU Munich, 1996.
+        The corners are in order, clockwise or counter-clockwise, without repeating the first. By Green's theorem the integrals
+        over the area become sums over the edges: C. Steger, On the calculation of arbitrary moments of polygons, report
+        FGBV-96-05, TU Munich, 1996.
 
-        Parameters
-        ----------
-        points : array_like
-            Corners (m) in order, clockwise or counter-clockwise, without repeating the first, shape (n, 2), n >= 3.
-
-        Raises
-        ------
-        ParameterError
-            If there are fewer than three corners, they enclose no area, or edges cross.
+        Raises ParameterError if there are fewer than three corners, they enclose no area, or edges cross.
         """
         corners = np.asarray(points, dtype=float)
         if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.all(np.isfinite(corners)):

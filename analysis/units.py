@@ -30,24 +30,6 @@ ROUNDING = 1e-9
 #: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
 
-#: Units of the FMI contract as pint spells them.
-_PINT = {
-    "1": "dimensionless",
-    "N.m": "N*m",
-    "kg.m2": "kg*m**2",
-    "kg/m3": "kg/m**3",
-    "m/s2": "m/s**2",
-    "rad/s2": "rad/s**2",
-    "N.s/m": "N*s/m",
-    "N.m/rad": "N*m/rad",
-    "N.m.s/rad": "N*m*s/rad",
-    "N/m2": "N/m**2",
-    "N/m3": "N/m**3",
-    "N.s2/m2": "N*s**2/m**2",
-    "m2": "m**2",
-    "m3": "m**3",
-}
-
 
 def display_scale(unit: str) -> tuple[str, float]:
     """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor from SI to this unit."""
@@ -61,9 +43,14 @@ def display_text(value: float, unit: str, digits: int = 6) -> str:
     return f"{factor * value:.{digits}g}" + ("" if shown == "1" else f" {shown}")
 
 
+def _pint_unit(unit: str) -> str:
+    """Return a unit of the FMI contract as pint spells it: "kg.m2" becomes "kg*m**2"."""
+    return "dimensionless" if unit == "1" else re.sub(r"(?<=[a-z])(\d)", r"**\1", unit.replace(".", "*"))
+
+
 def with_unit(value: float, unit: str) -> str:
     """Return a number in SI as a text with its unit, which `quantity` reads back exactly."""
-    return f"{float(value)!r} {_PINT.get(unit, unit)}"
+    return f"{float(value)!r} {_pint_unit(unit)}"
 
 
 @lru_cache(maxsize=1)
@@ -94,7 +81,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
         Hertz is refused for an angular speed, as a cycle is not a radian. A number of four turns or more is refused for an
         angle, unless ``bare`` gives its unit: it was probably meant in degrees.
     """
-    spelled = _PINT.get(unit, unit)
+    spelled = _pint_unit(unit)
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"
     if unit != "1":
         wanted += f", or a text with a unit of that kind{f', such as {_USUAL[unit]}' if unit in _USUAL else ''}"
@@ -124,10 +111,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
 def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
     """Convert a pair of numbers or texts with a unit, such as the ends of a range, to SI.
 
-    Raises
-    ------
-    ParameterError
-        If there are not two values; or as for `quantity`.
+    Raises ParameterError if there are not two values; or as for `quantity`.
     """
     ends: Any = () if isinstance(value, (str, Mapping)) else value
     try:
@@ -140,6 +124,8 @@ def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
 def si(value: Any, unit: Units, name: str) -> Any:
     """Convert texts with units to numbers in SI, also inside lists, tuples and mappings; return other values unchanged.
 
+    Raises ParameterError as for `quantity`, also for True and False.
+
     Parameters
     ----------
     value : object
@@ -147,11 +133,6 @@ def si(value: Any, unit: Units, name: str) -> Any:
         See `Units`. Entries of a mapping without a known unit are not converted; the caller refuses them.
     name : str
         Name of the value for error messages.
-
-    Raises
-    ------
-    ParameterError
-        As for `quantity`, also for True and False.
     """
     if isinstance(value, (str, bool)):
         return quantity(value, unit, name) if isinstance(unit, str) else value

@@ -217,51 +217,40 @@ def synthesize(
       linkwork synthesize examples/kinds.toml --set search.kinds='["slider-crank"]'
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
+    from .. import synthesis as syn
     from ..files import write_csv
-    from ..synthesis import (
-        SynthesisInterrupted,
-        TradeOffInterrupted,
-        alternatives,
-        assess,
-        crowded_plates,
-        format_sense,
-        format_short,
-        has_cognates,
-        load_synthesis_case,
-        solution_columns,
-    )
 
     overrides = read_overrides(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
     common.check_kind(case, common.SYNTHESIS)
-    chosen = load_synthesis_case(case, overrides)
+    chosen = syn.load_synthesis_case(case, overrides)
     stopped: Interrupted | None = None
     try:
         result = chosen.solve(progress=common.console.is_terminal)
-    except SynthesisInterrupted as error:
+    except syn.SynthesisInterrupted as error:
         if error.synthesis is None:
             raise
         result, stopped = error.synthesis, error
     forces = chosen.forces(result.with_variants)
     title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
-    best = assess(result.best, chosen.worst_violation)
+    best = syn.assess(result.best, chosen.worst_violation)
     print_best(best)
     folder = common.output_folder(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
-    if has_cognates(result.best):
-        others = alternatives(result.best)
+    if syn.has_cognates(result.best):
+        others = syn.alternatives(result.best)
         print_solutions(
             "the same curve from other pivots: the first one's cognates", others, violated=chosen.worst_violation
         )
-        written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
+        written.append(write_csv(folder / "cognates.csv", syn.solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plot=plot, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += common.save_plot(plot, result, folder / "alternatives.png", title=chosen.title)
     common.print_paths(written)
-    for note in filter(None, (best.poor, format_short(best.solution), format_sense(chosen.task))):
+    for note in filter(None, (best.poor, syn.format_short(best.solution), syn.format_sense(chosen.task))):
         common.note(note)
-    if crowded := crowded_plates(result.best, chosen.make.hole):
+    if crowded := syn.crowded_plates(result.best, chosen.make.hole):
         common.note(
             f"in the plates, holes of {1e3 * chosen.make.hole:g} mm overlap in {' and '.join(crowded)}: smaller make.pin "
             "and make.width, or longer links"
@@ -271,7 +260,7 @@ def synthesize(
     leave_if_stopped(stopped, "the best so far is kept")
     try:
         traded = chosen.trade(progress=common.console.is_terminal)
-    except TradeOffInterrupted as error:
+    except syn.TradeOffInterrupted as error:
         traded, stopped = error.trade_off, error
     if traded is not None:
         common.print_paths(_trade_off(traded, chosen.title, folder, plot, complete=stopped is None))

@@ -35,57 +35,43 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, plot: boo
       linkwork exact examples/five-poses.toml
       linkwork exact examples/sine-function.toml --set task.n=5
     """
+    from .. import synthesis as syn
     from ..files import write_csv
-    from ..synthesis import (
-        Generators,
-        Guidance,
-        GuidanceMap,
-        Motion,
-        PrecisionPoints,
-        QuickReturn,
-        QuickSwing,
-        RockerFunction,
-        assess,
-        function_generators,
-        guidance,
-        load_synthesis_case,
-        quality_cells,
-        solution_columns,
-    )
 
     common.check_kind(case, common.SYNTHESIS)
-    chosen = load_synthesis_case(case, read_overrides(settings))
-    found: Generators | Guidance | GuidanceMap
+    chosen = syn.load_synthesis_case(case, read_overrides(settings))
+    found: syn.Generators | syn.Guidance | syn.GuidanceMap
     task = chosen.task
-    if isinstance(task, QuickReturn | QuickSwing) or not isinstance(task, RockerFunction | PrecisionPoints | Motion):
+    closed = isinstance(task, syn.QuickReturn | syn.QuickSwing)
+    if closed or not isinstance(task, syn.RockerFunction | syn.PrecisionPoints | syn.Motion):
         which = f"{case} asks for a {type(task).__name__}, not for points of a rocker function or poses of a body"
         raise InputError(f"{which}: linkwork synthesize {case}")
-    if isinstance(task, RockerFunction):
-        found = function_generators(task, crank_phase=crank_phase)
+    if isinstance(task, syn.RockerFunction):
+        found = syn.function_generators(task, crank_phase=crank_phase)
     elif crank_phase is not None:
         raise InputError("--crank-phase is for a function of the rocker: poses leave the crank's angle free")
     else:
-        found = guidance(task)
+        found = syn.guidance(task)
     common.say(f"{chosen.title}: {found.describe()}")
     folder = common.output_folder(out)
     written = []
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)
-        if any(quality_cells(s)[-1] != "0" for s in found.solutions):
+        if any(syn.quality_cells(s)[-1] != "0" for s in found.solutions):
             common.note(
                 "each linkage meets all targets, but one with a branch or circuit defect needs both assemblies for them; "
                 "its errors are those in the assembly of the first target"
             )
         best = found.solutions[0]
-        written.append(write_csv(folder / "solutions.csv", solution_columns(found.solutions)))
+        written.append(write_csv(folder / "solutions.csv", syn.solution_columns(found.solutions)))
         if best.verdicts.sound:
-            assessment = assess(best)
+            assessment = syn.assess(best)
             print_best(assessment)
             written += write_description_files(
                 assessment, folder, chosen.title, curve="best-curve", text="best-report", drawn="best"
             )
             written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
-    if not isinstance(found, Generators):
+    if not isinstance(found, syn.Generators):
         written += common.save_plot(plot, found, folder / "poses.png", title=chosen.title)
     if found.solutions:
         written += common.save_plot(plot, found.solutions[0], folder / "best-linkage.png", title=chosen.title)

@@ -213,7 +213,7 @@ def _synthesis_case(kind: str, file: str) -> Iterator[str]:
     """Yield the lines of a new case file: a synthesis task; for the kind `SLIDER_MOTION` with a motion of the slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
-    from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
+    from ..synthesis import BOUNDS, KINDS, TABLES, UNITS
 
     moved = kind == SLIDER_MOTION
     task = "rocker-function" if moved else kind
@@ -224,7 +224,7 @@ def _synthesis_case(kind: str, file: str) -> Iterator[str]:
     if moved:
         yield "\n# The linkage whose pivot is moved; without this table it is found first."
         yield "# [linkage]"
-        dimensions = {name: Quantity("rad" if name in ANGLES else "m") for name in (*LENGTHS, *ANGLES)}
+        dimensions = {name: Quantity(unit) for name, unit in UNITS.items()}
         yield from entries(dict, {}, readers=dimensions)
     yield "\n# The dimensions: [least, greatest], or one value that fixes it."
     yield "# [bounds]"

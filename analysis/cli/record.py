@@ -12,18 +12,7 @@ import click
 from linkwork.errors import InputError, ParameterError
 
 from ..units import RAD_S_PER_RPM
-from .common import (
-    note,
-    out_option,
-    output_folder,
-    plot_option,
-    print_paths,
-    quantity,
-    report_errors,
-    save_plot,
-    say,
-    show_table,
-)
+from . import common
 
 
 @click.command()
@@ -46,9 +35,9 @@ from .common import (
 )
 @click.option("--friction", is_flag=True, help="Fit dry friction in addition to the damper.")
 @click.option("--least-swing", type=float, help="Smallest swing that is used, relative to the range; 0.1 by default.")
-@plot_option
-@out_option()
-@report_errors
+@common.plot_option
+@common.out_option()
+@common.report_errors
 def decrement(record: str, time: str | None, position: str | None, out: str, plot: bool, **options: Any) -> None:
     """Find damping and natural frequency from the decaying record of a freedom on its spring, by the logarithmic decrement.
 
@@ -69,17 +58,17 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     unit, kind, size = _column_unit(own, options["unit"], "--unit", ("m", "rad"))
     note_assumed_units(Path(record), (heading or options["time_unit"], own or options["unit"]), ("s", "m"))
     t = t * second
-    first = quantity(options["first"], "s", "--from") if options["first"] else -inf
-    last = quantity(options["last"], "s", "--to") if options["last"] else inf
+    first = common.quantity(options["first"], "s", "--from") if options["first"] else -inf
+    last = common.quantity(options["last"], "s", "--to") if options["last"] else inf
     kept = ~((t < first) | (t > last))
     least = LEAST_SWING if options["least_swing"] is None else options["least_swing"]
     decay = fit_decay(t[kept], x[kept], friction=options["friction"], least_swing=least)
     si = _UNITS[kind or "m"]
-    moving = None if options["mass"] is None else quantity(options["mass"], si[0], "--mass")
+    moving = None if options["mass"] is None else common.quantity(options["mass"], si[0], "--mass")
     if moving is not None and moving <= 0.0:
         raise click.UsageError(f"--mass {options['mass']}: it must be above zero")
     points = "samples" if decay.whole else "turning points"
-    show_table(
+    common.show_table(
         f"{Path(record).name}: {len(decay.time)} {points} from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
         ("", "value", "+-", "unit"),
         [
@@ -87,22 +76,22 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
             for name, value, error, its_unit in _result_rows(decay, moving, unit, size, si, options["friction"])
         ],
     )
-    say(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)")
+    common.say(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)")
     if decay.whole:
-        note("too few turning points: the whole curve is fitted, in which dry friction would count as damping")
+        common.note("too few turning points: the whole curve is fitted, in which dry friction would count as damping")
     elif not options["friction"]:
         with suppress(InputError):
             dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
             # more than noise and the approximation of the motion by waves can cause
             if dry.friction > 5.0 * dry.friction_error and dry.residual < 0.5 * decay.residual:
-                note(
+                common.note(
                     "the decrement grows from cycle to cycle, as with dry friction: with --friction the damping ratio is "
                     f"{dry.damping_ratio:.3g}, and the fit within {dry.residual:.2g}"
                 )
-    stem = output_folder(out) / f"{Path(record).stem}-decrement"
+    stem = common.output_folder(out) / f"{Path(record).stem}-decrement"
     columns = {"time [s]": decay.time, f"position [{unit}]": decay.position, f"fit [{unit}]": decay.fitted}
-    drawn = save_plot(plot, decay, f"{stem}.png", (t[kept], x[kept]), unit=unit, title=Path(record).name)
-    print_paths([write_csv(f"{stem}.csv", columns), *drawn])
+    drawn = common.save_plot(plot, decay, f"{stem}.png", (t[kept], x[kept]), unit=unit, title=Path(record).name)
+    common.print_paths([write_csv(f"{stem}.csv", columns), *drawn])
 
 
 #: SI units of mass or moment of inertia, damping coefficient, stiffness and friction, by the SI unit of the position.
@@ -120,7 +109,7 @@ def _column_unit(own: str, given: str | None, option: str, kinds: tuple[str, ...
         errors = []
         for kind in kinds:
             try:
-                return unit, kind, quantity(f"1 {unit}", kind, option)
+                return unit, kind, common.quantity(f"1 {unit}", kind, option)
             except ParameterError as error:
                 errors.append(error)
         raise errors[0]

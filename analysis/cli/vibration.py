@@ -105,33 +105,23 @@ def resonance(
       linkwork resonance --published rig-1-spring-b --set slider.damping='2 N*s/m' --turns 4 --places 24
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
-    from .. import figures
+    from .. import figures, periodic
     from ..files import write_csv
-    from ..periodic import (
-        NothingFreeError,
-        ResponseInterrupted,
-        default_variable,
-        frequency_response,
-        natural_frequency,
-        parameter_unit,
-        speed_names,
-        with_isolas,
-    )
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = find_mechanism(parameters)
     # if there are several cranks, the case says which of them are commanded; the ratios of their speeds are kept
-    vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic_freedoms) > 1 else None)
-    over_speed = vary in speed_names(mechanism)
+    vary = vary or periodic.default_variable(mechanism, chosen.drive() if len(mechanism.cyclic_freedoms) > 1 else None)
+    over_speed = vary in periodic.speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
     natural, modes = None, _find_modes(chosen.case, over_speed)
     with suppress(LinkworkError):  # the mechanism may have no spring
-        natural = natural_frequency(parameters)
-    if isinstance(modes, NothingFreeError):
+        natural = periodic.natural_frequency(parameters)
+    if isinstance(modes, periodic.NothingFreeError):
         chosen.drive("1 rad/s" if over_speed else None)  # its error says what to do; a range would not help
     ends = _range_ends(parameters, vary, low, high, natural, modes)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
@@ -139,7 +129,7 @@ def resonance(
     _print_natural_frequencies(natural, modes)
     interrupted = False
     try:
-        response = frequency_response(
+        response = periodic.frequency_response(
             parameters,
             *ends,
             drive=drive,
@@ -149,10 +139,10 @@ def resonance(
             progress=common.console.is_terminal,
         )
         if places:
-            response = with_isolas(response, places=places, turns=turns, progress=common.console.is_terminal)
-    except ResponseInterrupted as stopped:
+            response = periodic.with_isolas(response, places=places, turns=turns, progress=common.console.is_terminal)
+    except periodic.ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
-    unit, factor = display_scale(parameter_unit(mechanism, vary))
+    unit, factor = display_scale(periodic.parameter_unit(mechanism, vary))
     _print_branches(title, response, factor, unit)
     stem = common.output_folder(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]

@@ -23,23 +23,13 @@ RECORD = ".linkwork"
 
 @dataclass(slots=True)
 class Writing:
-    """The command that now writes files, and what it may overwrite.
+    """The command that now writes files, and what it may overwrite."""
 
-    Attributes
-    ----------
-    command : str
-        Name of the command; it may always overwrite its own files.
-    force : bool
-        Whether the command may also overwrite other files.
-    paths : dict of Path to Path
-        Where each file was written: at its path, or beside a file that had to be kept.
-    assumed : dict of Path to str
-        Sentences on the units assumed for files that were read and do not state them.
-    """
-
-    command: str
-    force: bool = False
+    command: str  # its name; it may always overwrite its own files
+    force: bool = False  # whether it may also overwrite other files
+    # where each file was written: at its path, or beside a file that had to be kept
     paths: dict[Path, Path] = field(default_factory=dict)
+    # sentences on the units assumed for files that were read and do not state them
     assumed: dict[Path, str] = field(default_factory=dict)
 
     @property

@@ -5,39 +5,6 @@
 motion; `track` runs the full plant under control.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from .cases import TABLES, SliderCase, linkage_from_csv, load_slider_case, read_slider_case, run_case
-from .inverse import BestSpring, Load, SliderDrive, TurnBalance, best_spring, inverse_dynamics
-from .motion import greatest_derivative, motion_of_plant, slider_motion
-from .strategy import Step, Strategy, StrategyInterrupted, simplest_mechanism
-from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
-from .variational import VariationalMotion, variational_motion
-
-__all__ = [
-    "TABLES",
-    "BestSpring",
-    "Load",
-    "SliderCase",
-    "SliderDrive",
-    "Step",
-    "Strategy",
-    "StrategyInterrupted",
-    "TrackingController",
-    "TrackingMetrics",
-    "TrackingResult",
-    "TurnBalance",
-    "VariationalMotion",
-    "best_spring",
-    "greatest_derivative",
-    "inverse_dynamics",
-    "linkage_from_csv",
-    "load_slider_case",
-    "motion_of_plant",
-    "read_slider_case",
-    "run_case",
-    "simplest_mechanism",
-    "slider_motion",
-    "track",
-    "variational_motion",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -27,9 +27,6 @@ from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
 from .tracking import TrackingController, TrackingResult, track
 
-#: Names of the dimensions of a linkage; the columns of solutions.csv have them with their units.
-DIMENSIONS = (*syn.LENGTHS, *syn.ANGLES)
-
 
 def _read_increasing(value: Any, name: str) -> tuple[int, ...]:
     return tuple(sorted(set(files.Many(files.Whole(0), least=1, single=True)(value, name))))
@@ -186,19 +183,6 @@ class SliderCase:
         """Return whether the links are optimised together with the motion."""
         return self.slider.links == "free"
 
-    @property
-    def _constraints(self) -> tuple[syn.Constraint, ...]:
-        constraints: tuple[Any, ...] = self.synthesis.constraints
-        if self.linkage is not None and not any(isinstance(c, syn.Assembly) for c in constraints):
-            constraints = (*constraints, syn.Assembly(branch=self.linkage.branch))
-        return constraints
-
-    def _bounds(self) -> Mapping[str, tuple[float, float]]:
-        """Return the bounds of the links: those of the case, or the dimensions of a given linkage that is kept."""
-        if self.linkage is None or self.free:
-            return self.synthesis.bounds
-        return _fixed_bounds(self.linkage)
-
     def find_four_bar(self, *, progress: bool = False) -> syn.Solution:
         """Evaluate the given linkage with a fixed pivot; if no linkage is given, search for the best four-bar."""
         task = self.synthesis.task
@@ -225,15 +209,13 @@ class SliderCase:
         ``four_bar`` is the linkage with a fixed pivot; ``guesses`` are further solutions to start from.
         """
         search = self.synthesis.search
-        bounds = (
-            _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
-        )
+        free = _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds)
         return slider_motion(
             self.synthesis.task,
             four_bar,
             self.slider.unknown(harmonics),
-            bounds=bounds,
-            constraints=self._constraints,
+            bounds=free if self.free else None,
+            constraints=self.synthesis.constraints,
             guesses=guesses,
             search=search.search(starts=self.slider.starts, progress=progress),
         )
@@ -242,10 +224,15 @@ class SliderCase:
         """Find the simplest mechanism within the tolerance; see `simplest_mechanism`."""
         wanted, search = self.strategy, self.synthesis.search
         assert wanted is not None
+        bounds, constraints = self.synthesis.bounds, self.synthesis.constraints
+        if self.linkage is not None:
+            bounds = bounds if self.free else _fixed_bounds(self.linkage)
+            if not any(isinstance(c, syn.Assembly) for c in constraints):
+                constraints = (*constraints, syn.Assembly(branch=self.linkage.branch))
         return simplest_mechanism(
             self.synthesis.task,
-            bounds=self._bounds(),
-            constraints=self._constraints,
+            bounds=bounds,
+            constraints=constraints,
             stroke=self.slider.stroke if isfinite(self.slider.stroke) else None,
             search=syn.Search(starts=wanted.starts, seed=search.seed, n_jobs=search.jobs, progress=progress),
             **{name: value for name, value in asdict(wanted).items() if name != "starts"},
@@ -343,10 +330,7 @@ class SliderCase:
         controller: dict[str, Any] = {"sample_time": period}
         if design is not None:
             gain, derivative_gain = design.gains.tolist()
-            controller["gain"], controller["derivative_gain"] = (
-                with_unit(gain, "N/m"),
-                with_unit(derivative_gain, "N.s/m"),
-            )
+            controller |= {"gain": with_unit(gain, "N/m"), "derivative_gain": with_unit(derivative_gain, "N.s/m")}
             controller["integral_gain"] = design.integral_gain
         if isfinite(wanted.limit):
             controller["limit"] = with_unit(wanted.limit, "N")
@@ -365,10 +349,7 @@ class SliderCase:
                 **({"controller.feed_forward": "reference.force"} if wanted.feedforward else {}),
                 "linkage.slider.force": "controller.force",
             },
-            "run": {
-                "stop_time": with_unit(wanted.revolutions * drive.period, "s"),
-                "step": period,
-            },
+            "run": {"stop_time": with_unit(wanted.revolutions * drive.period, "s"), "step": period},
         }
 
 
@@ -426,7 +407,7 @@ def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyTable:
 def _read_linkage(value: Any, name: str, *, folder: Path) -> syn.Linkage:
     """Read a linkage from its dimensions or from a file of `linkwork synthesize`."""
     if "file" not in files.as_table(value, name):
-        dimensions = {d: files.Quantity("rad" if d in syn.ANGLES else "m") for d in DIMENSIONS}
+        dimensions = {name: files.Quantity(unit) for name, unit in syn.UNITS.items()}
         return files.read(syn.Linkage, value, name, readers={**dimensions, "branch": files.Whole()})
     found: dict[str, Any] = files.read(dict, value, name, readers={"file": files.text, "rank": files.Whole(1)})
     return linkage_from_csv(folder / found["file"], found.get("rank", 1))
@@ -471,18 +452,14 @@ def read_slider_case(
 def linkage_from_csv(path: str | Path, rank: int = 1) -> syn.Linkage:
     """Read a linkage from a file of `Synthesis.to_csv`; ``rank`` 1 is the best linkage.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
+    Raises InputError if the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
     """
     rows = files.read_rows(path)
     if not 1 <= rank <= len(rows):
         raise InputError(f"{path} has {len(rows)} linkages: there is none of rank {rank}")
     row = rows[rank - 1]
-    columns = {name: f"{name} [{'rad' if name in syn.ANGLES else 'm'}]" for name in DIMENSIONS}
     try:
-        values: dict[str, Any] = {name: float(row[column]) for name, column in columns.items()}
+        values: dict[str, Any] = {name: float(row[f"{name} [{unit}]"]) for name, unit in syn.UNITS.items()}
         values["branch"] = int(float(row["branch"]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(

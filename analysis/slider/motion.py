@@ -16,40 +16,28 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from .. import synthesis as syn
 from ..numerics.fourier import FourierSeries
 from ..run import require_kind
-from ..synthesis import (
-    UNITS,
-    USUAL_SEARCH,
-    Assembly,
-    Constraint,
-    FullTurn,
-    Linkage,
-    PivotUnknown,
-    Search,
-    SliderMotion,
-    Solution,
-    Synthesis,
-    Task,
-    improve,
-)
 from ..units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
 
 
-@in_si(bounds=UNITS)
+@in_si(bounds=syn.UNITS)
 def slider_motion(
-    task: Task,
-    linkage: Linkage | Solution,
-    unknown: PivotUnknown,
+    task: syn.Task,
+    linkage: syn.Linkage | syn.Solution,
+    unknown: syn.PivotUnknown,
     *,
     bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
-    constraints: Sequence[Constraint] = (FullTurn(),),
-    guesses: Sequence[Linkage | Solution] = (),
-    search: Search = USUAL_SEARCH,
-) -> Synthesis:
-    """Find the motion of the rocker pivot that minimises the error of a linkage in a task.
+    constraints: Sequence[syn.Constraint] = (syn.FullTurn(),),
+    guesses: Sequence[syn.Linkage | syn.Solution] = (),
+    search: syn.Search = syn.USUAL_SEARCH,
+) -> syn.Synthesis:
+    """Find the motion of the rocker pivot that minimises the error of a linkage in a task: linkages with a moving pivot.
+
+    Raises InputError, InfeasibleError or SynthesisInterrupted as `synthesize` does.
 
     Parameters
     ----------
@@ -69,16 +57,6 @@ def slider_motion(
     search : Search
         Settings of the search, which starts from random harmonics and guide angles, without a scan.
 
-    Returns
-    -------
-    Synthesis
-        Solutions: linkages with a moving rocker pivot.
-
-    Raises
-    ------
-    InputError, InfeasibleError, SynthesisInterrupted
-        As for `synthesize`.
-
     Examples
     --------
     >>> import numpy as np
@@ -91,35 +69,35 @@ def slider_motion(
     >>> moved.best.evaluation.worst < 0.01
     True
     """
-    require_kind(linkage, (Linkage, Solution), "linkage", "a Linkage or Solution of analysis.synthesis")
-    given = linkage.linkage if isinstance(linkage, Solution) else linkage
+    require_kind(linkage, (syn.Linkage, syn.Solution), "linkage", "a Linkage or Solution of analysis.synthesis")
+    given = linkage.linkage if isinstance(linkage, syn.Solution) else linkage
     free = dict(bounds or {})
     kept = {name: value for name, value in given.values().items() if name != "branch" and name not in free}
-    asked = {c.branch for c in constraints if isinstance(c, Assembly)}
+    asked = {c.branch for c in constraints if isinstance(c, syn.Assembly)}
     if asked - {given.branch}:
         raise InputError(
             f"the constraints require assembly {asked.pop():+d}, but the linkage has assembly {given.branch:+d}: turn it over "
             "first"
         )
-    return improve(
+    return syn.improve(
         task,
         linkage,
         unknown,
         bounds={name: (value, value) for name, value in kept.items()} | free,
-        constraints=(*constraints, *(() if asked else (Assembly(branch=given.branch),))),
+        constraints=(*constraints, *(() if asked else (syn.Assembly(branch=given.branch),))),
         guesses=guesses,
         kept=kept,
         search=search,
     )
 
 
-def greatest_derivative(linkage: Linkage, order: int) -> float:
+def greatest_derivative(linkage: syn.Linkage, order: int) -> float:
     """Return the greatest magnitude, over a turn, of the slider position's derivative of the given ``order`` (m/rad^order).
 
     The derivative is with respect to the crank rotation; order 0 is the position itself. If no slider moves the pivot, the
     result is 0.
     """
-    if not isinstance(linkage.pivot, SliderMotion):
+    if not isinstance(linkage.pivot, syn.SliderMotion):
         return 0.0
     series = linkage.pivot.series
     for _ in range(order):
@@ -127,17 +105,14 @@ def greatest_derivative(linkage: Linkage, order: int) -> float:
     return float(np.abs(series(np.linspace(0.0, 2.0 * pi, 720, endpoint=False))).max())
 
 
-def motion_of_plant(linkage: Linkage) -> FourierSeries:
+def motion_of_plant(linkage: syn.Linkage) -> FourierSeries:
     """Return the slider position (m) as a Fourier series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
 
-    Raises
-    ------
-    InputError
-        If the rocker pivot is on a second crank.
+    Raises InputError if the rocker pivot is on a second crank.
     """
     if linkage.pivot is None:
         return FourierSeries.constant(0.0)
-    if not isinstance(linkage.pivot, SliderMotion):
+    if not isinstance(linkage.pivot, syn.SliderMotion):
         raise InputError(
             "the rocker pivot is on a second crank: a five-bar with a geared second crank cannot be simulated yet"
         )

@@ -14,23 +14,8 @@ from typing import Literal
 
 from linkwork.errors import InputError, Interrupted
 
+from .. import synthesis as syn
 from ..display import format_count
-from ..synthesis import (
-    QUICK_SEARCH,
-    UNITS,
-    USUAL,
-    Constraint,
-    CrankUnknown,
-    InfeasibleError,
-    RockerFunction,
-    Search,
-    SliderUnknown,
-    Solution,
-    Synthesis,
-    SynthesisInterrupted,
-    Task,
-    synthesize,
-)
 from ..units import Amount, in_si, si
 
 Criterion = Literal["error", "worst"]
@@ -56,7 +41,7 @@ class Step:
     """
 
     mechanism: str
-    solution: Solution | None
+    solution: syn.Solution | None
     value: float
     reason: str
 
@@ -103,19 +88,19 @@ class StrategyInterrupted(Interrupted):
         super().__init__(f"stopped after {format_count(len(strategy.steps) if strategy else 0, 'mechanism')}")
 
 
-@in_si(bounds=UNITS, stroke="m", second_crank="m")
+@in_si(bounds=syn.UNITS, stroke="m", second_crank="m")
 def simplest_mechanism(
-    task: Task,
+    task: syn.Task,
     tolerance: Amount,
     *,
     criterion: Criterion = "error",
     bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
-    constraints: Sequence[Constraint] = USUAL,
+    constraints: Sequence[syn.Constraint] = syn.USUAL,
     stroke: Amount = None,
     harmonics: int = 3,
     ratios: Sequence[int] = RATIOS,
     second_crank: Amount = None,
-    search: Search = QUICK_SEARCH,
+    search: syn.Search = syn.QUICK_SEARCH,
 ) -> Strategy:
     """Find the simplest mechanism whose error is within a tolerance, without circuit, branch or order defect.
 
@@ -140,10 +125,6 @@ def simplest_mechanism(
     search : Search
         Settings of the search for each mechanism; the four-bar has twice as many starts.
 
-    Returns
-    -------
-    Strategy
-
     Raises
     ------
     InputError
@@ -155,7 +136,7 @@ def simplest_mechanism(
     """
     if criterion not in ("error", "worst"):
         raise InputError(f"criterion {criterion!r}: it must be 'error' or 'worst'")
-    unit = ("rad" if isinstance(task, RockerFunction) else "m") + "**2" * (criterion == "error")
+    unit = ("rad" if isinstance(task, syn.RockerFunction) else "m") + "**2" * (criterion == "error")
     tolerance = si(tolerance, unit, "tolerance")
     if not (isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"tolerance is {tolerance}: it must be a finite number greater than zero")
@@ -179,16 +160,16 @@ def simplest_mechanism(
     reach = 0.5 * four_bar.linkage.ground_length if stroke is None else stroke
     guesses = [four_bar]
     for count in numbers:
-        slider = SliderUnknown(harmonics=count, stroke=reach)
+        slider = syn.SliderUnknown(harmonics=count, stroke=reach)
         found = tried.attempt(f"four-bar with a moved slider, {format_count(count, 'harmonic')}", slider, guesses)
         if tried.meets_tolerance():
             return tried.result()
         guesses += [found] if found else []
     longest = 0.5 * reach if second_crank is None else second_crank
     between = (min(1e-3 * reach, 0.5 * longest), longest)
-    geared: dict[int, Solution] = {}
+    geared: dict[int, syn.Solution] = {}
     for ratio in ratios:
-        crank = CrankUnknown(ratio=ratio, length=between)
+        crank = syn.CrankUnknown(ratio=ratio, length=between)
         found = tried.attempt(f"five-bar, second crank geared {ratio}:1", crank, [four_bar])
         if tried.meets_tolerance():
             return tried.result()
@@ -198,7 +179,7 @@ def simplest_mechanism(
     ratio = min(geared, key=lambda r: geared[r].value, default=1)
     guesses = [geared.get(ratio, four_bar)]
     for count in numbers:
-        crank = CrankUnknown(ratio=ratio, length=between, harmonics=count)
+        crank = syn.CrankUnknown(ratio=ratio, length=between, harmonics=count)
         found = tried.attempt(
             f"five-bar, second crank turned independently, {format_count(count, 'harmonic')}", crank, guesses
         )
@@ -212,12 +193,12 @@ def simplest_mechanism(
 class _Trials:
     """State of the search: the mechanisms tried so far, as ``steps``, and the arguments of `simplest_mechanism`."""
 
-    task: Task
+    task: syn.Task
     tolerance: float
     criterion: Criterion
     bounds: Mapping[str, tuple[float, float]] | None
-    constraints: Sequence[Constraint]
-    search: Search
+    constraints: Sequence[syn.Constraint]
+    search: syn.Search
     steps: list[Step] = field(default_factory=list)
     _met: bool = False
 
@@ -225,7 +206,7 @@ class _Trials:
         """Return whether the last mechanism meets the tolerance without a defect."""
         return self._met
 
-    def find_four_bar(self) -> Solution:
+    def find_four_bar(self) -> syn.Solution:
         """Find the best four-bar with a fixed pivot, record it and return it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
         solution = self._record("four-bar", self._run_search("four-bar", search))
@@ -233,59 +214,49 @@ class _Trials:
         return solution
 
     def attempt(
-        self, mechanism: str, unknown: SliderUnknown | CrankUnknown, guesses: Sequence[Solution]
-    ) -> Solution | None:
+        self, mechanism: str, unknown: syn.SliderUnknown | syn.CrankUnknown, guesses: Sequence[syn.Solution]
+    ) -> syn.Solution | None:
         """Optimise links and pivot motion together, record the result and return the best solution; None if there is none."""
         try:
             found = self._run_search(mechanism, self.search, unknown, guesses)
-        except InfeasibleError:
+        except syn.InfeasibleError:
             found = None
         return self._record(mechanism, found)
 
     def _run_search(
         self,
         mechanism: str,
-        search: Search,
-        pivot: SliderUnknown | CrankUnknown | None = None,
-        guesses: Sequence[Solution] = (),
-    ) -> Synthesis:
+        search: syn.Search,
+        pivot: syn.SliderUnknown | syn.CrankUnknown | None = None,
+        guesses: Sequence[syn.Solution] = (),
+    ) -> syn.Synthesis:
         try:
-            return synthesize(self.task, self.bounds, self.constraints, pivot=pivot, guesses=guesses, search=search)
-        except (SynthesisInterrupted, KeyboardInterrupt) as error:
-            if isinstance(error, SynthesisInterrupted) and error.synthesis is not None:
+            return syn.synthesize(self.task, self.bounds, self.constraints, pivot=pivot, guesses=guesses, search=search)
+        except (syn.SynthesisInterrupted, KeyboardInterrupt) as error:
+            if isinstance(error, syn.SynthesisInterrupted) and error.synthesis is not None:
                 self._record(mechanism, error.synthesis)
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
-    def _record(self, mechanism: str, found: Synthesis | None) -> Solution | None:
+    def _record(self, mechanism: str, found: syn.Synthesis | None) -> syn.Solution | None:
         """Record a mechanism and why it is accepted or rejected; return its best solution, None if there is no solution."""
         if found is None:
-            self.steps.append(
-                Step(
-                    mechanism=mechanism,
-                    solution=None,
-                    value=inf,
-                    reason="no solution satisfies the constraints: rejected",
-                )
-            )
+            reason = "no solution satisfies the constraints: rejected"
+            self.steps.append(Step(mechanism=mechanism, solution=None, value=inf, reason=reason))
             return None
         solution = found.best
         value = solution.error if self.criterion == "error" else solution.evaluation.worst
         defects = " and ".join(f"a {defect}" for defect in solution.verdicts.defects)
         within = value <= self.tolerance
         self._met = within and not defects
-        said = f"{self.criterion} {self._text(value)}"
-        reason = (
-            f"{said} is within {self._text(self.tolerance)}"
-            if within
-            else f"{said} is {value / self.tolerance:.3g} times the tolerance {self._text(self.tolerance)}"
-        )
+        compared = "within" if within else f"{value / self.tolerance:.3g} times the tolerance"
+        reason = f"{self.criterion} {self._text(value)} is {compared} {self._text(self.tolerance)}"
         reason += f", with {defects}" if defects else ""
         reason += ": accepted" if self._met else ": rejected" if found.complete else ": stopped"
         self.steps.append(Step(mechanism=mechanism, solution=solution, value=value, reason=reason))
         return solution
 
     def _text(self, value: float) -> str:
-        unit = "deg" if isinstance(self.task, RockerFunction) else "mm"
+        unit = "deg" if isinstance(self.task, syn.RockerFunction) else "mm"
         scale = degrees(1.0) if unit == "deg" else 1e3
         return f"{scale * value:.4g} {unit}" if self.criterion == "worst" else f"{scale * scale * value:.4g} {unit}2"
 

@@ -10,7 +10,6 @@ import pytest
 from analysis import synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import Step, Strategy, StrategyInterrupted, simplest_mechanism
-from analysis.slider import strategy as strategy_module
 from analysis.studies.youssef.problems import PROBLEMS
 from linkwork.errors import InputError
 from tests.linkages import BASE
@@ -191,7 +190,7 @@ def test_constraints_without_even_a_four_bar() -> None:
 def test_bad_input_is_named_before_anything_is_searched(
     monkeypatch: pytest.MonkeyPatch, tolerance: float | str, options: dict[str, Any], words: str
 ) -> None:
-    monkeypatch.setattr(strategy_module, "synthesize", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr(syn, "synthesize", lambda *_, **__: pytest.fail("searched"))
     task = syn.TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
     with pytest.raises(InputError, match=words):
         simplest_mechanism(task, tolerance, **options)
@@ -204,7 +203,7 @@ def step_of(verdicts: dict[str, bool], error: float) -> Step:
 
 
 def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = strategy_module.synthesize
+    real = syn.synthesize
 
     def defective(*arguments: Any, **more: Any) -> Any:
         found = real(*arguments, **more)
@@ -213,7 +212,7 @@ def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.Mon
         broken = [replace(s, verdicts=replace(s.verdicts, circuit=False, branch=False)) for s in found.solutions]
         return replace(found, solutions=tuple(broken))
 
-    monkeypatch.setattr(strategy_module, "synthesize", defective)
+    monkeypatch.setattr(syn, "synthesize", defective)
     found = strategy(BASE, 0.01 * MM2, harmonics=1, ratios=(), starts=2)
     assert found.steps[0].reason.endswith("is within 0.01 mm2, with a circuit defect and a branch defect: rejected")
     assert len(found.steps) == 2
@@ -225,7 +224,7 @@ def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("best", [True, False])
 def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: int, best: bool) -> None:
     series = FourierSeries(np.array([0.0, 0.012, 0.008]), np.array([0.0, 0.010, -0.009]))
-    real, calls = strategy_module.synthesize, []
+    real, calls = syn.synthesize, []
 
     def stopped(*arguments: Any, **more: Any) -> Any:
         calls.append(more)
@@ -235,7 +234,7 @@ def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: i
             raise KeyboardInterrupt
         raise syn.SynthesisInterrupted(replace(real(*arguments, **more), complete=False), 1, 4)
 
-    monkeypatch.setattr(strategy_module, "synthesize", stopped)
+    monkeypatch.setattr(syn, "synthesize", stopped)
     with pytest.raises(StrategyInterrupted, match=f"stopped after {stop + best or 'no'} mechanism") as caught:
         strategy(replace(BASE, pivot=syn.SliderMotion(series, 0.4)), 1e-20 * MM2, starts=1, bounds=links_of(BASE))
     kept = caught.value.strategy

@@ -11,23 +11,15 @@ import numpy as np
 
 from ... import slider_crank as sc
 from ..common import output_folder, print_paths, save_plot, say, show_table
-from .options import (
-    MechanismChoice,
-    Units,
-    add_mechanism_options,
-    angle_text,
-    out_option,
-    plot_option,
-    problem_options,
-)
+from . import options
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn
 
 
 @click.command(short_help="Find all joint forces over a turn.")
-@add_mechanism_options
-@problem_options(points=721)
+@options.add_mechanism_options
+@options.problem_options(points=721)
 @click.option(
     "--frame",
     "frames",
@@ -36,9 +28,9 @@ if TYPE_CHECKING:
     default=(1,),
     help="Frame of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given several times.",
 )
-@out_option
-@plot_option
-def forces(chosen: MechanismChoice, frames: Sequence[int], out: str, plot: bool) -> None:
+@options.out_option
+@options.plot_option
+def forces(chosen: options.MechanismChoice, frames: Sequence[int], out: str, plot: bool) -> None:
     """Find all joint forces over a turn, and the slider force if the torque is given, or the torque if the load is given.
 
     If the torque is given, the slider force is not finite at the dead centres. If the crank cannot make a full turn, all forces
@@ -70,7 +62,7 @@ def forces(chosen: MechanismChoice, frames: Sequence[int], out: str, plot: bool)
     print_paths(written)
 
 
-def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
+def _extremes(turn: ForceTurn, frames: Sequence[int], units: options.Units) -> Sequence[Sequence[str]]:
     """Return the rows of a table: least and greatest value of each quantity, with the crank angles at which they occur.
 
     ``frames`` are the numbers of the frames in which joint forces are given. Forces and torques near singular angles are left
@@ -111,21 +103,21 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     return rows
 
 
-def _special_places(turn: ForceTurn, units: Units) -> list[str]:
+def _special_places(turn: ForceTurn, units: options.Units) -> list[str]:
     """Return sentences on the dead centres and limits of assembly, and on the forces that are not determined at them."""
     without = f"grows without bound towards it; within {sc.CLEAR_DEG:g} deg it is not among the extremes"
     sentences = [
-        f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"
+        f"dead centre at {options.angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"
         for d in turn.dead_centres
     ]
     if turn.sought == sc.SLIDER_FORCE:
         sentences += [
-            f"no slider force at {angle_text(d.crank_angle)}: it has no lever on the crank there, and {without}"
+            f"no slider force at {options.angle_text(d.crank_angle)}: it has no lever on the crank there, and {without}"
             for d in turn.singularities
         ]
     sentences += [
-        f"limit of assembly at {angle_text(end)}: the rod is perpendicular to the guide there, and every force {without}"
-        for end in turn.limits
+        f"limit of assembly at {options.angle_text(d)}: the rod is perpendicular to the guide there, and every force {without}"
+        for d in turn.limits
     ]
     if not turn.clear().any():
         sentences.append("all crank angles are too near to these, so that no force has extremes")

@@ -21,17 +21,6 @@ from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
 from ...units import RAD_S_PER_RPM
 from .. import common
-from ..common import (
-    NUMBER,
-    PARAMETERS,
-    changes,
-    check_kind,
-    in_units,
-    note,
-    quantity,
-    report_errors,
-    typed_value,
-)
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -68,8 +57,8 @@ class Units:
             unit = variables[found[1]].unit if found[1] in variables else ""
             return found[0][:-1] + f" {unit}:" if unit in ("m", "N", "N.m") else found[0]
 
-        text = re.sub(rf"^parameter ([\w.]+) is {NUMBER}:", parameter, text)
-        return in_units(text, lambda si: (self.name(si), self.factor(si)))
+        text = re.sub(rf"^parameter ([\w.]+) is {common.NUMBER}:", parameter, text)
+        return common.in_units(text, lambda si: (self.name(si), self.factor(si)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +113,7 @@ class MechanismChoice:
         )
         if len(turn.unreachable):
             missing = f"{len(turn.unreachable)} of {len(angles)} crank angles"
-            note(f"the rod does not reach the guide at {missing}, which are left out")
+            common.note(f"the rod does not reach the guide at {missing}, which are left out")
         return turn
 
 
@@ -152,7 +141,7 @@ def _choose(
     if file is not None:
         if published is not None:
             raise click.UsageError("give either a file of parameters or --published NAME")
-        check_kind(file, PARAMETERS)
+        common.check_kind(file, common.PARAMETERS)
         parameters = load_parameters(file)
         if not isinstance(parameters, SliderCrankParameters):
             raise InputError(
@@ -166,16 +155,16 @@ def _choose(
         start, pace = case.initial.shift_position, case.crank_speed
     else:
         raise unknown_name(name, SETS, f"published case {name!r}")
-    values = changes(settings, "rod.length='45 in'")
+    values = common.changes(settings, "rod.length='45 in'")
     for key, text in (("guide.offset", offset), ("guide.twist", twist)):
         if text is not None:
-            values[key] = typed_value(text)
+            values[key] = common.typed_value(text)
     if shift is not None:
         if groove is not None:
             raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
-        start = quantity(shift, "m", "--shift")
+        start = common.quantity(shift, "m", "--shift")
     if speed is not None:
-        pace = quantity(speed, "rad/s", "--speed")
+        pace = common.quantity(speed, "rad/s", "--speed")
     if values:
         parameters = read_parameters(values, parameters)
         assert isinstance(parameters, SliderCrankParameters)
@@ -193,7 +182,7 @@ def _choose(
         used += ["no groove (--groove)"] if held and parameters.groove_amplitude != 0.0 else []
         used += [f"a crank speed of {pace / RAD_S_PER_RPM:.6g} rpm (--speed)"] if paced and speed is None else []
         if used:
-            note(f"used by default, as nothing else is given: {', '.join(used)}")
+            common.note(f"used by default, as nothing else is given: {', '.join(used)}")
     elif values or shift is not None or groove is not None:
         name, title = "slider-crank", _title(units, parameters, start, groove)
     return MechanismChoice(
@@ -240,7 +229,7 @@ def add_mechanism_options(command: Command) -> Command:
     """Add to a command the options that choose a mechanism; the command receives a `MechanismChoice` as ``chosen``."""
 
     @wraps(command)
-    @report_errors
+    @common.report_errors
     def run(**options: Any) -> Any:
         names = ("file", "published", "offset", "shift", "twist", "groove", "settings", "speed")
         own, units = {name: options.pop(name, None) for name in names}, Units(options.pop("units"))
@@ -279,8 +268,8 @@ def _given(torque: str | None, load: str | None) -> dict[str, float]:
     if torque is not None and load is not None:
         raise click.UsageError("give either --torque, to find the slider force, or --load, to find the torque")
     if torque is not None:
-        return {"torque": quantity(torque, "N.m", "--torque")}
-    return {"load": quantity("0" if load is None else load, "N", "--load")}
+        return {"torque": common.quantity(torque, "N.m", "--torque")}
+    return {"load": common.quantity("0" if load is None else load, "N", "--load")}
 
 
 def angle_text(value: float) -> str:

@@ -13,14 +13,7 @@ from linkwork.errors import InputError
 
 from ... import slider_crank as sc
 from ..common import console, note, output_folder, print_paths, quantity, save_plot, show_table, workers_options
-from .options import (
-    MechanismChoice,
-    Units,
-    add_mechanism_options,
-    out_option,
-    plot_option,
-    problem_options,
-)
+from . import options
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
@@ -31,8 +24,8 @@ _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
 
 @click.command(short_help="Report the effect of manufacturing tolerances.")
-@add_mechanism_options
-@problem_options(points=73)
+@options.add_mechanism_options
+@options.problem_options(points=73)
 @click.option(
     "--tolerance",
     "widths",
@@ -59,10 +52,10 @@ _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 @click.option("--samples", type=click.IntRange(2), default=100_000, help="Number of Monte Carlo samples.")
 @click.option("--seed", type=click.IntRange(0), default=0, help="The same seed gives the same samples.")
 @workers_options()
-@out_option
-@plot_option
+@options.out_option
+@options.plot_option
 def tolerances(
-    chosen: MechanismChoice,
+    chosen: options.MechanismChoice,
     widths: Sequence[str],
     distribution: str,
     quantities: Sequence[str],
@@ -120,7 +113,7 @@ def _degrees(turn: ForceTurn, i: int) -> float:
     return degrees(float(turn.angle[i]))
 
 
-def _reduce_to_turn(angle: float, chosen: MechanismChoice) -> float:
+def _reduce_to_turn(angle: float, chosen: options.MechanismChoice) -> float:
     """Return a crank angle reduced to the range from 0 to 2 pi (rad).
 
     Raises InputError if the angle is outside of this range and the shift of the crank differs from turn to turn.
@@ -149,7 +142,7 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
 
 
 def _sensitivity_table(
-    exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: Units
+    exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: options.Units
 ) -> tuple[Sequence[Sequence[str]], dict[str, Any]]:
     """Return the rows of the printed table of sensitivities, and the columns of the CSV file by name with unit.
 
@@ -187,7 +180,7 @@ def _unit_quotient(above: str, below: str) -> str:
     return f"{above}/({below})" if "." in below or "/" in below else f"{above}/{below}"
 
 
-def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
+def _spread_columns(found: MonteCarlo, units: options.Units) -> dict[str, Any]:
     """Return the results of a Monte Carlo simulation, over crank angles of a turn, as columns by name with unit."""
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
     for name, spread in found.spreads.items():
@@ -206,7 +199,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
     return columns | {"not assembled": found.not_assembled, "at a dead centre": found.undetermined}
 
 
-def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
+def _show_spread(found: MonteCarlo, place: int, title: str, units: options.Units) -> None:
     """Print the linear estimate and the statistics of the samples at one crank angle; "±" is two standard errors.
 
     ``place`` is the index of the crank angle.

@@ -18,19 +18,8 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 from ...files import Choice, Kinds, Many, Quantity, Table, Whole, any_value, entry, flag, read, read_points, text
 from ...units import quantity
 from ..exact.generation import QuickReturn, QuickSwing
+from ..task import task as tasks
 from ..task.target import TargetPath, function_from_formula, path_from_formula, transform_points
-from ..task.task import (
-    Motion,
-    Objective,
-    PrecisionPoints,
-    RockerFunction,
-    SliderFunction,
-    Straight,
-    Task,
-    TimedPath,
-    UntimedPath,
-    turn,
-)
 
 FloatArray = NDArray[np.float64]
 
@@ -101,7 +90,7 @@ class Smoothing:
 
 
 _STRAIGHT = Table(
-    Straight,
+    tasks.Straight,
     {
         "start": Whole(0),
         "end": Whole(0),
@@ -200,7 +189,7 @@ class _ObjectiveAndRange:
         One weight per target, or windows [{ from = "60 deg", to = "260 deg", weight = 1000 }] of crank rotations.
     """
 
-    objective: Objective = entry(Choice(get_args(Objective)), "error")
+    objective: tasks.Objective = entry(Choice(get_args(tasks.Objective)), "error")
     n: int | None = entry(Whole(3), None)
     start: float | str | None = entry(_end, None)
     end: float | str | None = entry(_end, None)
@@ -281,21 +270,23 @@ class _Curve(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedPathTable(_Curve):
-    """The table ``[task]`` of a `TimedPath`."""
+    """The table ``[task]`` of a `tasks.TimedPath`."""
 
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(any_value, None)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         points = self._timed_points(folder, self.rotation)
         rotation = _rotation(self.rotation, points)
-        at = turn(len(points)) if rotation is None else rotation
-        return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective)
+        at = tasks.turn(len(points)) if rotation is None else rotation
+        return tasks.TimedPath(
+            points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
-    """The table ``[task]`` of an `UntimedPath`.
+    """The table ``[task]`` of an `tasks.UntimedPath`.
 
     Attributes
     ----------
@@ -308,10 +299,10 @@ class UntimedPathTable(_Curve):
     measure: Any = entry(Choice(("area", "distance")), "area")
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
-    straight: Straight | None = entry(_STRAIGHT, None)
+    straight: tasks.Straight | None = entry(_STRAIGHT, None)
     weights: Any = entry(any_value, None)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         points, closed = self._target_points(folder)
         path = TargetPath(points=points, closed=closed)
         if self.smoothing is not None:
@@ -320,7 +311,7 @@ class UntimedPathTable(_Curve):
                 raise ParameterError("task.smoothing", True, requirement)
             path = path.smooth(self.smoothing.points, deviation=self.smoothing.deviation)
         weights = _weights(self.weights, None, len(path.points))
-        return UntimedPath(
+        return tasks.UntimedPath(
             path=path,
             weights=weights,
             measure=self.measure,
@@ -332,7 +323,7 @@ class UntimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionPointsTable(_Curve):
-    """The table ``[task]`` of `PrecisionPoints`.
+    """The table ``[task]`` of `tasks.PrecisionPoints`.
 
     Attributes
     ----------
@@ -361,26 +352,26 @@ class PrecisionPointsTable(_Curve):
             "points": points, "angle": angle, "rotation": rotation, "length": self.length, "objective": self.objective,
         }  # fmt: skip
 
-    def task(self, folder: Path) -> Task:
-        return PrecisionPoints(**self._body(folder))
+    def task(self, folder: Path) -> tasks.Task:
+        return tasks.PrecisionPoints(**self._body(folder))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionTable(PrecisionPointsTable):
-    """The table ``[task]`` of a `Motion`."""
+    """The table ``[task]`` of a `tasks.Motion`."""
 
     weights: Any = entry(any_value, None)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         body = self._body(folder)
         if body["angle"] is None:
             raise MissingParameterError("task.angle")
-        return Motion(**body, weights=_weights(self.weights, body["rotation"], len(body["points"])))
+        return tasks.Motion(**body, weights=_weights(self.weights, body["rotation"], len(body["points"])))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockerFunctionTable(_ObjectiveAndRange):
-    """The table ``[task]`` of a `RockerFunction`.
+    """The table ``[task]`` of a `tasks.RockerFunction`.
 
     Attributes
     ----------
@@ -400,7 +391,7 @@ class RockerFunctionTable(_ObjectiveAndRange):
     mounting: bool = entry(flag, False)
     spacing: Any = entry(Choice(("even", "chebyshev")), None)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         written = isinstance(self.angle, str)
         if _only_source(self, ("angle", "file")) == "file" or written:
             _refuse_entries(self, ("rotation",), "angle as a list")
@@ -417,16 +408,16 @@ class RockerFunctionTable(_ObjectiveAndRange):
         else:
             angle = np.array(Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle"))
             rotation = _rotation(self.rotation, np.cos(angle), np.sin(angle))
-        at = turn(len(angle)) if rotation is None else rotation
+        at = tasks.turn(len(angle)) if rotation is None else rotation
         weights = _weights(self.weights, at)
-        return RockerFunction(
+        return tasks.RockerFunction(
             angle=angle, rotation=rotation, weights=weights, mounting=self.mounting, objective=self.objective
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderFunctionTable(_ObjectiveAndRange):
-    """The table ``[task]`` of a `SliderFunction`.
+    """The table ``[task]`` of a `tasks.SliderFunction`.
 
     Attributes
     ----------
@@ -439,7 +430,7 @@ class SliderFunctionTable(_ObjectiveAndRange):
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(any_value, None)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         if isinstance(self.position, str):
             _refuse_entries(self, ("rotation",), "position as a list")
             rotation, numbers = function_from_formula(self.position, **self._range())
@@ -448,9 +439,9 @@ class SliderFunctionTable(_ObjectiveAndRange):
             _refuse_entries(self, ("n", "start", "end"), "position as a formula")
             position = np.array(Many(Quantity("m", bare=self.unit))(self.position, "task.position"))
             given = _rotation(self.rotation, position)
-            rotation = turn(len(position)) if given is None else given
+            rotation = tasks.turn(len(position)) if given is None else given
         weights = _weights(self.weights, rotation)
-        return SliderFunction(position=position, rotation=rotation, weights=weights, objective=self.objective)
+        return tasks.SliderFunction(position=position, rotation=rotation, weights=weights, objective=self.objective)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -467,7 +458,7 @@ class QuickReturnTable:
     swing: float | None = entry(Quantity("rad"), None)
     time_ratio: float = entry(Quantity("1", least=1.0), 1.0)
 
-    def task(self, folder: Path) -> Task:
+    def task(self, folder: Path) -> tasks.Task:
         if _only_source(self, ("stroke", "swing")) == "swing":
             return QuickSwing(swing=float(self.swing or 0.0), time_ratio=self.time_ratio)
         return QuickReturn(stroke=float(self.stroke or 0.0), time_ratio=self.time_ratio)
@@ -485,6 +476,6 @@ KINDS: Mapping[str, type] = {
 }
 
 
-def read_task(value: Any, name: str, *, folder: Path) -> Task:
+def read_task(value: Any, name: str, *, folder: Path) -> tasks.Task:
     """Read the task from the table ``[task]``; names of further files are relative to ``folder``."""
     return Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)

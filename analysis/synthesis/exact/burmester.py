@@ -50,12 +50,8 @@ LONGEST = 5.0
 class Dyad:
     """A link that turns about a fixed pivot and guides a point of a body.
 
-    Attributes
-    ----------
-    pivot : complex
-        The link's fixed end (m): a point of the centre-point curve.
-    point : complex
-        The link's other end with the body in the first pose (m): a point of the circle-point curve.
+    ``pivot`` is its fixed end, a point of the centre-point curve; ``point`` is its other end with the body in the first pose, a
+    point of the circle-point curve (m).
     """
 
     pivot: complex
@@ -217,25 +213,13 @@ def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
 
 
 def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the four dyads of five poses, including complex ones.
+    """Compute the four dyads of five poses, including complex ones, in units of the poses' size.
 
-    Parameters
-    ----------
-    p : ndarray of complex, shape (5,)
-        Positions of the body's reference point relative to the first position, in units of the poses' size.
-    angle : ndarray, shape (5,)
-        Angles of the body (rad).
+    ``p`` are the positions of the body's reference point as complex numbers, ``angle`` its angles (rad), shape (5,). The result
+    is z and m, shape (4, 2): Cartesian coordinates of point and pivot of each dyad, relative to the first position; real for a
+    dyad that can be built.
 
-    Returns
-    -------
-    z, m : ndarray of complex, shape (4, 2)
-        Cartesian coordinates (x, y) of point and pivot of each dyad relative to the first position, in the same units; real
-        for a dyad that can be built.
-
-    Raises
-    ------
-    InputError
-        If the conditions of the poses are not independent.
+    Raises InputError if the conditions of the poses are not independent.
     """
     rows = _conditions(p, angle)
     plane = _null_space(rows, 3)

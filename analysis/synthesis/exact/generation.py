@@ -28,7 +28,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import acos, cos, degrees, hypot, inf, isfinite, pi, sin, sqrt
 from typing import Any
 
@@ -57,14 +56,7 @@ ON_CIRCLE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Generators(Exact):
-    """All four-bars that generate a function exactly at its points.
-
-    Attributes
-    ----------
-    task : RockerFunction
-    solutions : tuple of Solution
-        Sound linkages first, then by transmission angle.
-    """
+    """All four-bars that generate a function exactly at its points: sound linkages first, then by transmission angle."""
 
     task: RockerFunction
     solutions: tuple[Solution, ...]
@@ -90,6 +82,8 @@ _DEPENDENT_POINTS = (
 def function_generators(task: RockerFunction, *, crank_phase: Amount | None = None) -> Generators:
     """Find all four-bars whose rocker passes exactly through the given angles.
 
+    Raises InputError if there are more or fewer points than unknowns, or the points leave infinitely many linkages.
+
     Parameters
     ----------
     task : RockerFunction
@@ -97,11 +91,6 @@ def function_generators(task: RockerFunction, *, crank_phase: Amount | None = No
         given, and the mounting angle if it is free (``mounting``).
     crank_phase : float, optional
         th20 (rad); unknown by default.
-
-    Raises
-    ------
-    InputError
-        If there are more or fewer points than unknowns, or the points leave infinitely many linkages.
 
     Examples
     --------
@@ -239,6 +228,9 @@ BETWEEN = 90
 def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Linkage, Linkage]:
     """Compute the Roberts-Chebyshev cognates of a four-bar.
 
+    Raises ParameterError if the linkage is not a four-bar with a fixed rocker pivot, or the coupler point is B or C;
+    AssemblyError if the links cannot be joined at ``rotation``.
+
     Parameters
     ----------
     linkage : Linkage
@@ -253,13 +245,6 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
         Three four-bars with the same coupler curve; G is the third fixed pivot. The first has the pivots G and D and its crank
         at G. The second has the pivots A and G and its crank at A. The third is the second with its crank at G.
 
-    Raises
-    ------
-    ParameterError
-        If the linkage is not a four-bar with a fixed rocker pivot, or the coupler point is B or C.
-    AssemblyError
-        If the links cannot be joined at ``rotation``.
-
     Examples
     --------
     >>> import numpy as np
@@ -271,7 +256,7 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     >>> np.allclose(cognates(four_bar)[0].path(phi), four_bar.path(phi), rtol=0.0, atol=1e-15)
     True
     """
-    k = _checked_coupler_ratio(linkage)
+    k = _coupler_ratio(linkage)
     pins = {name: complex(*place) for name, place in linkage.pins(float(np.asarray(rotation))).items()}
     a, b, c, d, p = (pins[name] for name in "ABCDP")
     g = a + k * (d - a)
@@ -290,19 +275,13 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     If the task gives crank rotations, only the cognate with the same crank rotations is returned. For a closed path
     only cognates whose cranks can turn fully are returned.
 
+    Raises InputError if the task is not a path: the coupler of a cognate has other angles than the coupler of the original;
+    ParameterError as `cognates` does; AssemblyError if the links cannot be joined at the first target.
+
     Returns
     -------
     tuple of Solution
         Sound linkages first.
-
-    Raises
-    ------
-    InputError
-        If the task is not a path: the coupler of a cognate has other angles than the coupler of the original.
-    ParameterError
-        As `cognates`.
-    AssemblyError
-        If the links cannot be joined at the first target.
     """
     task, linkage, rotation = solution.task, solution.linkage, solution.rotation
     if not _is_path(task):
@@ -331,7 +310,7 @@ def _cognate_sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, 
 
     An assembly is +1 with C to the left of B -> D, -1 to the right.
     """
-    k = _checked_coupler_ratio(linkage)
+    k = _coupler_ratio(linkage)
     g = linkage.directions(rotation)
     # positions relative to A, with the ground link along the real axis
     b = linkage.crank_length * np.exp(1j * (rotation + linkage.crank_phase))
@@ -347,34 +326,26 @@ def _cognate_sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, 
 
 def has_cognates(solution: Solution) -> bool:
     """Return whether a solution has cognates: a path traced by a four-bar whose coupler point is neither B nor C."""
-    linkage = solution.linkage
-    return _is_path(solution.task) and linkage.kind == "four-bar" and linkage.pivot is None and _is_off_pins(linkage)
+    try:
+        _coupler_ratio(solution.linkage)
+    except ParameterError:
+        return False
+    return _is_path(solution.task)
 
 
 def _is_path(task: Task) -> bool:
     return not isinstance(task, RockerFunction) and getattr(task, "angle", None) is None
 
 
-def _is_off_pins(linkage: Linkage) -> bool:
-    return min(abs(k := _coupler_ratio(linkage)), abs(1.0 - k)) > 1e-9
-
-
 def _coupler_ratio(linkage: Linkage) -> complex:
-    """Return (P - B)/(C - B), the complex ratio of coupler point and coupler."""
-    return linkage.point_distance / linkage.coupler_length * complex(np.exp(1j * linkage.point_angle))
-
-
-def _checked_coupler_ratio(linkage: Linkage) -> complex:
-    """Return `_coupler_ratio` of a linkage that has cognates; raise ParameterError as `cognates` for any other."""
+    """Return (P - B)/(C - B), the complex ratio of coupler point and coupler; raise ParameterError if there are no cognates."""
     if linkage.kind != "four-bar" or linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
-    if not _is_off_pins(linkage):
-        raise ParameterError(
-            "point_distance",
-            linkage.point_distance,
-            "put the coupler point off B and C, whose curves are circles, in m",
-        )
-    return _coupler_ratio(linkage)
+    k = linkage.point_distance / linkage.coupler_length * complex(np.exp(1j * linkage.point_angle))
+    if min(abs(k), abs(1.0 - k)) <= 1e-9:
+        wanted = "put the coupler point off B and C, whose curves are circles, in m"
+        raise ParameterError("point_distance", linkage.point_distance, wanted)
+    return k
 
 
 # Quick returns
@@ -478,57 +449,102 @@ def quick_returns(
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
         raise InfeasibleError("the constraints require both assemblies at once")
-    cosine: Callable[[float], float]
-    margins: Callable[[float], FloatArray]
+    shapes: _StrokeShapes | _SwingShapes
     if isinstance(task, QuickReturn):
-        ends = _dimension_ranges(task, bounds, constraints)
-        asked, kind = f"a stroke of {1e3 * float(task.stroke):g} mm", "slider-crank"
-        cosine, couplers = partial(_transmission_cosine, task=task, ends=ends), ends["coupler_length"]
-        margins = partial(_bound_margins, task=task, ends=ends)
+        shapes, kind = _StrokeShapes(task, bounds, constraints), "slider-crank"
+        asked = f"a stroke of {1e3 * float(task.stroke):g} mm"
     else:
-        shape = _SwingShapes(task, bounds, constraints)
-        asked, kind = f"a swing of {degrees(float(task.swing)):g} deg", "crank-rocker"
-        cosine, couplers, margins = shape.cosine, shape.couplers, shape.margins
+        shapes, kind = _SwingShapes(task, bounds, constraints), "crank-rocker"
+        asked = f"a swing of {degrees(float(task.swing)):g} deg"
     asked += f" and a time ratio of {task.time_ratio:g}"
-    l3, least = _best_coupler(cosine, couplers, margins), _least_angle(constraints)
-    if not cosine(l3) < 1.0:
+    least = max((float(c.angle) for c in constraints if isinstance(c, LeastTransmission)), default=0.0)
+    l3 = _best_coupler(shapes)
+    cosine = shapes.cosine(l3)
+    if not cosine < 1.0:
         raise InfeasibleError(f"no {kind} with {asked} has a crank that turns fully within these bounds")
-    if acos(cosine(l3)) < least:
+    if acos(cosine) < least:
         raise InfeasibleError(
             f"a transmission angle of {degrees(least):g} deg is asked for: with {asked} the best {kind} has "
-            f"{degrees(acos(cosine(l3))):.4g} deg"
+            f"{degrees(acos(cosine)):.4g} deg"
         )
-    made = [
-        _make_slider_crank(task, l3, b) if isinstance(task, QuickReturn) else shape.linkage(l3, b)
-        for b in branches or (1, -1)
-    ]
-    return rank_solutions([Solution.from_linkage(task, linkage) for linkage in made])
+    return rank_solutions([Solution.from_linkage(task, shapes.linkage(l3, branch)) for branch in branches or (1, -1)])
 
 
-def _least_angle(constraints: Sequence[Any]) -> float:
-    return max((float(c.angle) for c in constraints if isinstance(c, LeastTransmission)), default=0.0)
+def _best_coupler(shapes: _StrokeShapes | _SwingShapes) -> float:
+    """Find the coupler length, within its bounds, that minimises the cosine of the transmission angle.
 
-
-def _best_coupler(
-    cosine: Callable[[float], float], ends: tuple[float, float], margins: Callable[[float], FloatArray]
-) -> float:
-    """Find the coupler length, between two bounds, that minimises the cosine of the transmission angle.
-
-    ``margins`` are functions of this length that are zero where a bound of another link is reached: the search includes these
-    lengths, which may be the only possible ones if the length of the other link is fixed.
+    The search includes the lengths at which a bound of another link is reached: these may be the only possible ones if the
+    length of the other link is fixed.
     """
+    ends, cosine = shapes.couplers, shapes.cosine
     couplers = np.linspace(*ends, COUPLERS)
-    values = np.array([margins(float(l3)) for l3 in couplers])
+    values = np.array([shapes.margins(float(l3)) for l3 in couplers])
     reached = [
-        brentq(lambda l3, m=m: margins(l3)[m], *couplers[k : k + 2], xtol=1e-15 * ends[1])
+        brentq(lambda l3, m=m: shapes.margins(l3)[m], *couplers[k : k + 2], xtol=1e-15 * ends[1])
         for k, m in zip(*np.nonzero(values[:-1] * values[1:] < 0.0))
     ]
     couplers = np.sort(np.append(couplers, reached))
-    cosines = np.array([cosine(float(l3)) for l3 in couplers])
-    best = int(np.argmin(cosines))
+    best = int(np.argmin([cosine(float(l3)) for l3 in couplers]))
     low, high = couplers[max(best - 1, 0)], couplers[min(best + 1, len(couplers) - 1)]
     found = minimize_scalar(cosine, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high})
     return float(min((couplers[best], float(found.x)), key=cosine))
+
+
+class _StrokeShapes:
+    """Slider-cranks with a given stroke and time ratio. ``l3`` is the length of the coupler (m)."""
+
+    def __init__(self, task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> None:
+        self.stroke, self.advance = float(task.stroke), task.advance
+        longest = LARGEST * self.stroke
+        cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=longest)
+        ends = _read_bounds(bounds, BOUNDED, SliderCrank.links)
+        offset, crank, (low, high) = ((least, min(cap, most)) for least, most in ends.values())
+        self.bounds = offset, crank
+        # the coupler is at least half the stroke, as with a time ratio of 1 and no offset
+        most = self.stroke / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
+        self.couplers = max(low, 0.5 * self.stroke), min(high, most)
+        if not self.couplers[0] <= self.couplers[1]:
+            raise InfeasibleError(
+                f"the coupler is to be {1e3 * low:g} to {1e3 * high:g} mm: with this stroke and time ratio it is "
+                f"{500.0 * self.stroke:g} mm at least" + (f" and {1e3 * most:g} mm at most" if isfinite(most) else "")
+            )
+
+    def margins(self, l3: float) -> FloatArray:
+        """Return by how much offset and crank exceed each of their bounds (m)."""
+        lengths = np.array(_lengths(l3, self.advance, self.stroke))
+        return (lengths[:, None] - self.bounds).ravel()
+
+    def cosine(self, l3: float) -> float:
+        """Return the cosine of the least transmission angle over a turn.
+
+        The result is 1 if no linkage exists, a bound is violated, or the dead centres need different assemblies.
+        """
+        l1, l2 = _lengths(l3, self.advance, self.stroke)
+        for value, (low, high) in zip((l1, l2), self.bounds):
+            if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+                return 1.0
+        # both dead centres lie on one side of the offset's foot
+        if l2 == 0.0 or (l3 + l2) ** 2 - l1 * l1 <= self.stroke * self.stroke:
+            return 1.0
+        return min(1.0, (l1 + l2) / l3)
+
+    def linkage(self, l3: float, branch: int) -> SliderCrank:
+        """Build the slider-crank, its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
+        l1, l2 = _lengths(l3, self.advance, self.stroke)
+        far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
+        # crank angle with the slider at 0: crank and coupler folded, or stretched on the other side of the shaft
+        phase = pi + acos(l1 / (l3 - l2)) if branch > 0 else -acos(l1 / (l3 + l2))
+        return SliderCrank(
+            pivot_x=-near if branch > 0 else far,
+            pivot_y=l1,
+            ground_length=l1,
+            crank_length=l2,
+            coupler_length=l3,
+            point_distance=l3,
+            ground_angle=-0.5 * pi,
+            crank_phase=phase,
+            branch=branch,
+        )
 
 
 class _SwingShapes:
@@ -617,72 +633,7 @@ def _read_bounds(bounds: Any, names: Sequence[str], links: Sequence[str]) -> dic
     return {name: (max(low, 0.0), high) for name, (low, high) in both.items()}
 
 
-def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
-    """Return the least and greatest length of offset, crank and coupler, by name (m)."""
-    cap = min(
-        (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
-    )
-    ends = {
-        name: (low, min(cap, high)) for name, (low, high) in _read_bounds(bounds, BOUNDED, SliderCrank.links).items()
-    }
-    # the coupler is at least half the stroke, as with a time ratio of 1 and no offset
-    low, high = ends["coupler_length"]
-    turned = task.advance
-    most = float(task.stroke) / (2.0 * sin(0.5 * turned)) if turned > 0.0 else inf
-    ends["coupler_length"] = max(low, 0.5 * float(task.stroke)), min(high, most)
-    if not ends["coupler_length"][0] <= ends["coupler_length"][1]:
-        raise InfeasibleError(
-            f"the coupler is to be {1e3 * low:g} to {1e3 * high:g} mm: with this stroke and time ratio it is "
-            f"{500.0 * float(task.stroke):g} mm at least"
-            + (f" and {1e3 * most:g} mm at most" if isfinite(most) else "")
-        )
-    return ends
-
-
 def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
     """Return offset and crank length (m) for a coupler length l3, a crank advance ``turned`` (rad) and a stroke or chord h."""
     l2 = sqrt(max(0.5 * h * h - l3 * l3 * (1.0 - cos(turned)), 0.0) / (1.0 + cos(turned)))
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
-
-
-def _bound_margins(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> FloatArray:
-    """Return by how much offset and crank exceed each of their bounds ``ends`` (m), for a coupler length l3."""
-    lengths = np.array(_lengths(l3, task.advance, float(task.stroke)))
-    return (lengths[:, None] - [ends["ground_length"], ends["crank_length"]]).ravel()
-
-
-def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
-    """Return the cosine of the least transmission angle over a turn.
-
-    ``l3`` is the coupler length, ``ends`` has the bounds of offset and crank. The result is 1 if no linkage exists, a bound is
-    violated, or the dead centres need different assemblies.
-    """
-    stroke = float(task.stroke)
-    l1, l2 = _lengths(l3, task.advance, stroke)
-    for name, value in (("ground_length", l1), ("crank_length", l2)):
-        low, high = ends[name]
-        if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
-            return 1.0
-    # both dead centres lie on one side of the offset's foot
-    if l2 == 0.0 or (l3 + l2) ** 2 - l1 * l1 <= stroke * stroke:
-        return 1.0
-    return min(1.0, (l1 + l2) / l3)
-
-
-def _make_slider_crank(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
-    """Build the slider-crank, its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
-    l1, l2 = _lengths(l3, task.advance, float(task.stroke))
-    far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
-    # crank angle with the slider at 0: crank and coupler folded, or stretched on the other side of the shaft
-    phase = pi + acos(l1 / (l3 - l2)) if branch > 0 else -acos(l1 / (l3 + l2))
-    return SliderCrank(
-        pivot_x=-near if branch > 0 else far,
-        pivot_y=l1,
-        ground_length=l1,
-        crank_length=l2,
-        coupler_length=l3,
-        point_distance=l3,
-        ground_angle=-0.5 * pi,
-        crank_phase=phase,
-        branch=branch,
-    )

@@ -18,13 +18,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from math import cos, isfinite, pi, sin
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, ParameterError
+from linkwork.five_bar import kinematics
 
 from ...mechanisms import FIVE_BAR
 from ...numerics.fourier import FourierSeries
@@ -60,17 +61,14 @@ TEETH = 6
 class SliderMotion:
     """Motion of the rocker pivot D along a guide: a Fourier series of the crank's rotation phi.
 
+    Raises ParameterError if the guide's angle is not finite.
+
     Attributes
     ----------
     series : FourierSeries
         Position u(phi) on the guide from the end E of the ground link (m); its order is the number of harmonics.
     guide_angle : float
         alpha, the guide's direction from the ground link (rad).
-
-    Raises
-    ------
-    ParameterError
-        If the guide's angle is not finite.
     """
 
     series: FourierSeries
@@ -117,6 +115,9 @@ class SecondCrank:
     D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio.
     The input shaft, with the rotation phi, turns once per period of the linkage, in which the first crank turns k times.
 
+    Raises ParameterError if the length is not greater than zero, the ratio is not a quotient as above, or the phase is not
+    finite.
+
     Attributes
     ----------
     length : float
@@ -127,11 +128,6 @@ class SecondCrank:
         psi at phi = 0, without the series (rad).
     series : FourierSeries
         Rotation that is added to the rotation by the gears, a function of phi (rad); zero if gears alone turn the crank.
-
-    Raises
-    ------
-    ParameterError
-        If the length is not greater than zero, the ratio is not a quotient as above, or the phase is not finite.
     """
 
     length: float
@@ -164,6 +160,9 @@ class Linkage:
 
     Lengths in m, angles in rad.
 
+    Raises ParameterError if a value is not finite, a link is not longer than zero, the branch is not +1 or -1, or the pivot has
+    a wrong type.
+
     Attributes
     ----------
     pivot_x, pivot_y : float
@@ -182,11 +181,6 @@ class Linkage:
         Assembly: +1 with C to the left of B -> D, -1 to the right.
     pivot : SliderMotion, optional
         Motion of the rocker pivot; None for a fixed pivot.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not finite, a link is not longer than zero, the branch is not +1 or -1, or the pivot has a wrong type.
     """
 
     kind: ClassVar[Kind] = "four-bar"
@@ -438,6 +432,28 @@ class Linkage:
         """
         return 2.0 * l1 * l2 * (1.0 - cosine)
 
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        """Return a value that is zero in a dead centre: the closure error of the triangle A, C, D, also for CasADi symbols.
+
+        ``reach`` is the distance AC, ``c`` the cosine of the angle at A, ``d`` has the dimensions.
+        """
+        l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
+        return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        """Return a value that is zero in a toggle; c is the cosine of the crank angle, side 1 for stretched, -1 for folded."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        reach = l3 + l4 if side > 0.0 else l3 - l4
+        return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+
+    @staticmethod
+    def driven_speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        """Return the speed of the driven link divided by the speed of the crank; ``g`` is the position of the closed loop."""
+        lengths: Any = SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)
+        return kinematics.coefficients(g, lengths).k42
+
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
         """Return the cosine of the angle between coupler and rocker, from `reach`.
 
@@ -552,6 +568,19 @@ class SliderCrank(Linkage):
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
         return 2.0 * (l1 + l2) * l2 * (1.0 - cosine)
 
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        return (d.ground_length - reach * c) / d.coupler_length
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        """Return a value that is zero in a toggle, in which the coupler is perpendicular to the guide."""
+        return (d.ground_length - d.crank_length * c) / d.coupler_length - side
+
+    @staticmethod
+    def driven_speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        return (g.s3 * g.c2 - g.c3 * g.s2) / g.s3
+
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
         """Return the cosine of the angle between the coupler and the normal of the guide, from `reach`."""
         return -reach / self.coupler_length
@@ -562,10 +591,7 @@ class SliderCrank(Linkage):
 class FiveBar(Linkage):
     """A five-bar with two cranks: a four-bar whose rocker pivot D is on a second crank about the end E of the ground link.
 
-    Attributes
-    ----------
-    pivot : SecondCrank
-        Motion of the second crank: geared to the first crank, or independent.
+    ``pivot`` is the motion of the second crank: geared to the first crank, or independent.
     """
 
     kind: ClassVar[Kind] = "geared-five-bar"

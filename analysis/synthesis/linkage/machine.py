@@ -29,7 +29,7 @@ from ...files import Many, Quantity, entry
 from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
 from ...run import parameter_symbols
-from .linkage import LINKS, FiveBar, Kind, Linkage, SliderCrank, SliderMotion
+from .linkage import LINKS, FiveBar, Linkage, SliderCrank, SliderMotion
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
@@ -53,19 +53,10 @@ def link_mass_properties(
 ) -> dict[str, Any]:
     """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
 
-    Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
-    and C (``straight``), it is one bar over the whole length.
-
-    Parameters
-    ----------
-    l2, l3, l4, r, a2 : float
-        Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
-    line : float
-        Mass of a bar per length (kg/m).
-    width : float
-        Width of a bar (m).
-    straight : bool
-        Whether P is on the line of B and C.
+    Crank, coupler and rocker have the lengths l2, l3, l4; r and a2 are distance and direction of the coupler point (m, rad). A
+    bar has the mass ``line`` per length (kg/m) and the width ``width`` (m). Crank and rocker are bars between their pins. The
+    coupler consists of two bars, B to C and B to P; if P is on the line of B and C (``straight``), it is one bar over the whole
+    length.
     """
     m2, i2 = bar_mass_properties(l2, line, width)
     m4, i4 = bar_mass_properties(l4, line, width)
@@ -261,16 +252,9 @@ class MachineSpec:
     def plant_values(self, d: Any, straight: bool, sliding: bool, law: Callable[..., dict[str, Any]]) -> dict[str, Any]:
         """Return the parameters of the five-bar plant for a linkage, by name, without the parameters of its slider.
 
-        Parameters
-        ----------
-        d : namespace
-            Dimensions and branch, by their names in `Linkage`: numbers or CasADi symbols.
-        straight : bool
-            Whether the coupler point is on the line of B and C.
-        sliding : bool
-            Whether the linkage is a slider-crank; see `sliding_five_bar`.
-        law : callable
-            `link_mass_properties`, for numbers or symbols.
+        ``d`` has dimensions and branch by their names in `Linkage`, as numbers or CasADi symbols, for which ``law`` is
+        `link_mass_properties`. ``straight`` says whether the coupler point is on the line of B and C, ``sliding`` whether the
+        linkage is a slider-crank; see `sliding_five_bar`.
         """
         links, far = {name: getattr(d, name) for name in LINKS}, FAR * d.coupler_length
         if sliding:
@@ -328,19 +312,10 @@ def pin_functions(
 ) -> dict[str, tuple[Any, Any]]:
     """Return the components of each pin's force along and across the ground link (N), by pin, for CasADi symbols or numbers.
 
-    Parameters
-    ----------
-    d : namespace
-        Dimensions and branch, by their names in `Linkage`.
-    make : MachineSpec
-    crank_angle : CasADi column
-        th2, one or more angles (rad).
-    straight : bool
-        Whether the coupler point is on the line of B and C, see `link_mass_properties`.
-    linkage : type
-        Type of the linkage; for a slider-crank the force at D is the force of the guide on the slider.
-    on_slider : bool
-        Whether the coupler point is the pin C of a slider-crank, whose slider then carries the load.
+    ``d`` has dimensions and branch by their names in `Linkage`; ``crank_angle`` is a CasADi column of angles th2 (rad).
+    ``straight`` says whether the coupler point is on the line of B and C, see `link_mass_properties`; ``linkage`` is the type
+    of the linkage. For a slider-crank the force at D is the force of the guide on the slider; ``on_slider`` says whether the
+    coupler point is its pin C, so that the slider carries the load.
     """
     casadi = symbolic.library()
     kind, plant, law = _trace_plant()
@@ -406,6 +381,8 @@ class PinForces:
 def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None) -> PinForces:
     """Compute the forces on the pins of a linkage at constant crank speed, from the equations of the five-bar plant.
 
+    Raises ParameterError if the rocker pivot moves; AssemblyError if the links cannot be joined at some crank rotation.
+
     Parameters
     ----------
     linkage : Linkage
@@ -413,13 +390,6 @@ def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float
     make : MachineSpec
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.
-
-    Raises
-    ------
-    ParameterError
-        If the rocker pivot moves.
-    AssemblyError
-        If the links cannot be joined at some crank rotation.
     """
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: for a moving pivot use slider.inverse_dynamics")
@@ -438,55 +408,6 @@ def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float
 # Limit positions and mechanical advantage
 
 
-class _FourBarPositions:
-    """Conditions for the limit positions of a four-bar, for numbers and symbols; see `POSITIONS`."""
-
-    @staticmethod
-    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
-        """Return the closure error of the triangle A, C, D, zero in a dead centre.
-
-        ``reach`` is the distance AC, ``c`` the cosine of the angle at A, ``d`` has the dimensions.
-        """
-        l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
-        return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
-
-    @staticmethod
-    def toggle_gap(d: Any, c: Any, side: float) -> Any:
-        """Return a value that is zero in a toggle; c is the cosine of the crank angle, side 1 for stretched, -1 for folded."""
-        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
-        reach = l3 + l4 if side > 0.0 else l3 - l4
-        return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
-
-    @staticmethod
-    def speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        """Return the speed of the driven link divided by the speed of the crank; ``g`` is the position of the closed loop."""
-        lengths: Any = SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)
-        return kinematics.coefficients(g, lengths).k42
-
-
-class _SliderCrankPositions(_FourBarPositions):
-    """Conditions for the limit positions of a slider-crank; in a toggle the coupler is perpendicular to the guide."""
-
-    @staticmethod
-    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
-        return (d.ground_length - reach * c) / d.coupler_length
-
-    @staticmethod
-    def toggle_gap(d: Any, c: Any, side: float) -> Any:
-        return (d.ground_length - d.crank_length * c) / d.coupler_length - side
-
-    @staticmethod
-    def speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        return (g.s3 * g.c2 - g.c3 * g.s2) / g.s3
-
-
-#: Conditions for each kind of linkage; a geared five-bar has no dead centres.
-POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
-    "four-bar": _FourBarPositions,
-    "slider-crank": _SliderCrankPositions,
-}
-
-
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
     """Return the crank rotations of the dead centres, within a turn from 0 (rad), in increasing order; empty if there are none.
 
@@ -500,7 +421,7 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
         if reach == 0.0:
             continue
         # cosine of the coupler's direction, which points to the side of the assembly
-        cosine = _linear_root(partial(POSITIONS[linkage.kind].dead_gap, linkage, reach))
+        cosine = _linear_root(partial(linkage.dead_gap, linkage, reach))
         if abs(cosine) > 1.0:
             continue
         th3 = linkage.branch * acos(cosine)
@@ -517,7 +438,7 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
         return _toggles_by_roots(linkage)
     found = []
     for side in (1.0, -1.0):
-        cosine = _linear_root(partial(POSITIONS[linkage.kind].toggle_gap, linkage, side=side))
+        cosine = _linear_root(partial(linkage.toggle_gap, linkage, side=side))
         if abs(cosine) <= 1.0:
             found += [acos(cosine), -acos(cosine)]
     return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
@@ -566,8 +487,7 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     places: Any = (np.cos(th2), np.sin(th2), *linkage.directions(phi))
     g = kinematics.Position(*places)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lengths = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
-        speed = POSITIONS[linkage.kind].speed(g, *lengths)
+        speed = linkage.driven_speed(g, linkage.crank_length, linkage.coupler_length, linkage.rocker_length)
         ratio = np.where(speed == 0.0, inf, 1.0 / speed)
     return ratio.reshape(np.shape(rotation))
 

@@ -208,19 +208,10 @@ PIN, LETTER = 0.008, 0.022
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
     """Draw a linkage: links with their lengths, pins, guide, coupler curve and target, in coordinates of the plane (m).
 
-    Parameters
-    ----------
-    solution : Solution
-    rotation : float, optional
-        Crank rotation (rad); by default the first rotation of the task, or else of a turn, at which the links can be joined.
-    poses : int
-        Number of further positions, in thin lines, at equal steps over the task.
-    title : str
+    The crank is at ``rotation`` (rad), by default the first rotation of the task, or else of a turn, at which the links can be
+    joined. ``poses`` is the number of further positions, in thin lines, at equal steps over the task.
 
-    Raises
-    ------
-    AssemblyError
-        If the links cannot be joined at ``rotation``, or at any rotation.
+    Raises AssemblyError if the links cannot be joined at ``rotation``, or at any rotation.
     """
     scene = LinkageScene(solution, title)
     tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
@@ -366,9 +357,8 @@ def _plate_holes(solution: Solution) -> dict[str, dict[str, complex]]:
     if not isinstance(linkage, SliderCrank):
         made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
     if linkage.slider(0.0) is None:
-        made = {
-            "ground": {"A": 0j, "E" if isinstance(linkage, FiveBar) else "D": complex(linkage.ground_length)}
-        } | made
+        end = "E" if isinstance(linkage, FiveBar) else "D"
+        made = {"ground": {"A": 0j, end: complex(linkage.ground_length)}} | made
     if isinstance(linkage, FiveBar):
         made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
     return made
@@ -386,21 +376,10 @@ def crowded_plates(solution: Solution, pin: float) -> tuple[str, ...]:
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
     """Draw the links as plates with round ends and holes for the pins, one below the other, with dimensions.
 
-    The ground link is drawn if both its ends are pivots; the guide of a slider is not drawn. The coupler includes the coupler
-    point if the task has one.
+    ``width`` and ``thickness`` are those of each plate, ``pin`` is the diameter of the holes (m). The ground link is drawn if
+    both its ends are pivots; the guide of a slider is not drawn. The coupler includes the coupler point if the task has one.
 
-    Parameters
-    ----------
-    width, thickness : float
-        Width and thickness of each plate (m).
-    pin : float
-        Diameter of the holes (m), less than the width.
-    title : str
-
-    Raises
-    ------
-    ParameterError
-        If the holes are not narrower than the plates, or a size is not greater than zero.
+    Raises ParameterError if the holes are not narrower than the plates, or a size is not greater than zero.
     """
     for name, value in (("width", width), ("thickness", thickness), ("pin", pin)):
         if not (isfinite(value) and value > 0.0):
@@ -589,18 +568,9 @@ def description(
 ) -> dict[str, Any]:
     """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
 
-    A rocker pivot that moves on a guide, or on a crank without gears, is a second degree of freedom. For such a linkage
-    `drives` returns the speeds of crank and pivot.
-
-    Parameters
-    ----------
-    linkage : Linkage
-    make : MachineSpec
-        Bars, gravity and the speed of the crank.
-    rotation : float
-        Rotation of the input shaft at the start (rad).
-    direction : float
-        Sense in which the crank turns: +1 counter-clockwise, -1 clockwise.
+    ``make`` has bars, gravity and the speed of the crank. The input shaft starts at ``rotation`` (rad); the crank turns
+    counter-clockwise if ``direction`` is +1, clockwise if -1. A rocker pivot that moves on a guide, or on a crank without
+    gears, is a second degree of freedom: `drives` returns the speeds of crank and pivot.
     """
     a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
     end = shaft + rect(linkage.ground_length, a1)
@@ -625,19 +595,17 @@ def description(
         "freedoms": {"crank": crank},
         "assembly": {"C": linkage.branch},
     }
-    if isinstance(linkage, SliderCrank):
-        bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
-        if linkage.point_is_pin:
-            # the load acts on the block, not on the coupler
-            bodies["block"]["points"]["P"] = [0, 0]
-        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
-    else:
-        bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
     second = linkage.pivot
+    if not isinstance(linkage, SliderCrank):
+        bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
+    if isinstance(linkage, SliderCrank) or isinstance(second, SliderMotion):
+        pin, guide = ("D", second.guide_angle) if isinstance(second, SliderMotion) else ("C", 0.5 * pi)
+        bodies["block"] = {"points": {pin: [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
+        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + guide, "rad")}}
+    if linkage.point_is_pin:
+        # the load acts on the block, not on the coupler
+        bodies["block"]["points"]["P"] = [0, 0]
     if isinstance(second, SliderMotion):
-        along = with_unit(a1 + second.guide_angle, "rad")
-        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
-        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": along}}
         position = with_unit(float(second.series(rotation)), "m")
         tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
     elif second is not None:
@@ -648,13 +616,8 @@ def description(
     elif isinstance(second, SecondCrank):
         # angle of the second crank while the first crank points along x
         phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
-        tables["gears"] = {
-            "teeth": {
-                "bodies": ["crank", "second"],
-                "ratio": second.ratio,
-                "phase": with_unit(remainder(phase, tau), "rad"),
-            }
-        }
+        turned = with_unit(remainder(phase, tau), "rad")
+        tables["gears"] = {"teeth": {"bodies": ["crank", "second"], "ratio": second.ratio, "phase": turned}}
     if "slides" in tables and (spring := _spring_table(make)):
         tables["springs"] = {"slider": {"at": "guide"} | spring}
     if acting := loads(make):
@@ -709,12 +672,8 @@ def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direct
 
 def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
     """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point; see `link_mass_properties`."""
-    line = make.density * make.width * make.thickness
-    r, a2 = linkage.point_distance, linkage.point_angle
-    straight = is_on_line(linkage.coupler_length, r, a2)
-    links = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
-    made = link_mass_properties(*links, r, a2, line, make.width, straight)
-    made |= make.link_masses(made)
+    straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
+    made = make.plant_values(linkage, straight, False, link_mass_properties)
     centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
     return {
         "mass": with_unit(made["coupler_mass"], "kg"),

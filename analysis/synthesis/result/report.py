@@ -27,18 +27,8 @@ from ..linkage.linkage import (
     wrap_angles,
 )
 from ..linkage.machine import dead_centres, mechanical_advantage, time_ratio, toggles
+from ..task import task as tasks
 from ..task.constraint import SECOND_LENGTH, stroke
-from ..task.task import (
-    Normal,
-    PrecisionPoints,
-    RockerFunction,
-    SliderFunction,
-    Task,
-    TimedPath,
-    UntimedPath,
-    normal_form,
-    turn,
-)
 from .solution import (
     CLOSELY,
     CURVE,
@@ -95,7 +85,9 @@ def length_step(linkage: Linkage) -> float:
     return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
 
 
-def _residuals(linkage: Linkage, normal: Normal, rotation: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
+def _residuals(
+    linkage: Linkage, normal: tasks.Normal, rotation: FloatArray, across: bool
+) -> tuple[FloatArray, FloatArray]:
     """Compute the derivatives of the m residuals by the k dimensions, (m, k), and the residuals, (m,), at rotations.
 
     The residuals of points come first, then the residuals of angles. The residuals of points are in x and y or, if ``across``,
@@ -147,8 +139,8 @@ def displacements(solution: Solution) -> dict[str, float]:
     dimension, the displacement is across the curve.
     """
     task, linkage = solution.task, solution.linkage
-    normal = normal_form(task)
-    jacobian, _ = _residuals(linkage, normal, solution.station_rotations(), isinstance(task, UntimedPath))
+    normal = tasks.normal_form(task)
+    jacobian, _ = _residuals(linkage, normal, solution.station_rotations(), isinstance(task, tasks.UntimedPath))
     moved = np.sqrt((jacobian**2).sum(axis=0) / normal.n)
     # a rocker's angle depends neither on the position of the linkage nor on its coupler point
     idle = set(PLACES) - {*LINKS, "crank_phase"} if normal.of_rocker else set(linkage.absent_dimensions)
@@ -156,17 +148,9 @@ def displacements(solution: Solution) -> dict[str, float]:
 
 
 def round_dimensions(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
-    """Round lengths and angles to whole steps, and compute the increase of the error.
+    """Round lengths and angles to whole steps (m, rad), and compute the increase of the error.
 
-    Parameters
-    ----------
-    length, angle : float
-        Steps (m, rad); `length_step` and 0.1 degrees by default.
-
-    Raises
-    ------
-    InputError
-        If a step is not above zero.
+    The default steps are `length_step` and 0.1 degrees. Raises InputError if a step is not above zero.
     """
     length = length_step(solution.linkage) if length is None else length
     for what, step in (("length", length), ("angle", angle)):
@@ -186,21 +170,21 @@ def round_dimensions(solution: Solution, length: float | None = None, angle: flo
 def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
     """Return the mean quality function for random errors within half a step of each dimension; see `Rounding.expected`."""
     task, linkage = solution.task, solution.linkage
-    area = isinstance(task, UntimedPath) and task.measure == "area"
-    if isinstance(task, UntimedPath) and area:
+    area = isinstance(task, tasks.UntimedPath) and task.measure == "area"
+    if isinstance(task, tasks.UntimedPath) and area:
         # at least as many stations as the evaluation has points
         task = replace(task, samples=max(task.samples, CURVE))
-    normal = normal_form(task)
+    normal = tasks.normal_form(task)
     given = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
     names = _names(linkage, normal)
 
     def residuals(made: Linkage) -> tuple[FloatArray, FloatArray]:
         at = given
-        if isinstance(task, UntimedPath):
+        if isinstance(task, tasks.UntimedPath):
             # the crank rotations adapt to the changed dimension
             at = nearest_rotations(made, normal.places, *solution.traced_range())
         assert at is not None
-        return _residuals(made, normal, at, isinstance(task, UntimedPath))
+        return _residuals(made, normal, at, isinstance(task, tasks.UntimedPath))
 
     jacobian, left = residuals(linkage)
     square, shift = np.zeros(len(left)), np.zeros(len(left))
@@ -229,19 +213,10 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """Compute, for each dimension, how much an error of one step in the worse direction increases the quality function.
+    """Compute how much an error of one step in the worse direction increases the quality function, for each dimension by name.
 
-    The changed linkages are evaluated, so that steps may have any size. The increase is infinite if the links cannot be joined.
-
-    Parameters
-    ----------
-    length, angle : float
-        Steps (m, rad).
-
-    Returns
-    -------
-    dict
-        Increase of the quality function by name of the dimension, without guide angle and Fourier coefficients of a motion.
+    The steps are ``length`` (m) and ``angle`` (rad); guide angle and Fourier coefficients of a motion are left out. The changed
+    linkages are evaluated, so that steps may have any size. The increase is infinite if the links cannot be joined.
     """
     linkage, grown = solution.linkage, {}
     for name, value in _manufactured_dimensions(linkage).items():
@@ -272,7 +247,7 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
     return safe * np.sqrt(2.0 / pi) * np.exp(-0.5 * ratio**2) + mean * erf(ratio / np.sqrt(2.0))
 
 
-def _names(linkage: Linkage, normal: Normal) -> list[str]:
+def _names(linkage: Linkage, normal: tasks.Normal) -> list[str]:
     """Return the names of the dimensions in the columns of `_residuals`, in order."""
     mounted = [] if normal.angle is None else ["output_angle"]
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot_dimensions(linkage, np.zeros(1)))]
@@ -322,22 +297,23 @@ def _replace_dimension(linkage: Linkage, name: str, value: float) -> Linkage:
     return replace(linkage, pivot=replace(linkage.pivot, **own))
 
 
-def quality_unit(task: Task) -> tuple[float, str]:
+def quality_unit(task: tasks.Task) -> tuple[float, str]:
     """Return the factor from SI to the unit in which a task's quality function is written, and the name of this unit."""
-    return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
+    factor, unit = error_unit(task)
+    return factor**2, f"{unit}²"
 
 
-def error_unit(task: Task) -> tuple[float, str]:
+def error_unit(task: tasks.Task) -> tuple[float, str]:
     """Return the factor from SI to the unit in which a task's errors are written, and the name of this unit."""
-    return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
+    return (180.0 / pi, "deg") if isinstance(task, tasks.RockerFunction) else (1e3, "mm")
 
 
-def quality_name(task: Task) -> str:
+def quality_name(task: tasks.Task) -> str:
     """Return the name of a task's quality function."""
     weighted = not np.all(np.asarray(getattr(task, "weights", 1.0)) == 1.0)
-    if isinstance(task, UntimedPath) and task.measure == "area":
+    if isinstance(task, tasks.UntimedPath) and task.measure == "area":
         return f"{'weighted ' if weighted else ''}area between the curves"
-    what = "errors of angle" if isinstance(task, RockerFunction) else "errors"
+    what = "errors of angle" if isinstance(task, tasks.RockerFunction) else "errors"
     return f"sum of {'weighted ' if weighted else ''}squared {what}"
 
 
@@ -382,14 +358,14 @@ def format_poor(solution: Solution) -> str:
     if solution.measures_area:
         said = f"{100.0 * share:.2g} % of the target's area is wrong"
     else:
-        extent = "swing" if isinstance(task, RockerFunction) else "size"
+        extent = "swing" if isinstance(task, tasks.RockerFunction) else "size"
         said = f"the rms error is {100.0 * share:.2g} % of the target's {extent}"
     better = _IMPROVEMENTS[solution.linkage.kind]
     if solution.linkage.pivot is not None and solution.linkage.kind == "four-bar":
         better = "more harmonics of its pivot's motion, or a smoother or smaller target, may do better"
-    elif isinstance(task, SliderFunction):
+    elif isinstance(task, tasks.SliderFunction):
         better = "a smaller stroke or swing of the crank may do better"
-    elif isinstance(task, PrecisionPoints):
+    elif isinstance(task, tasks.PrecisionPoints):
         better = "fewer points may be met exactly"
     return f"a poor answer: {said}; {better}"
 
@@ -403,14 +379,14 @@ def format_short(solution: Solution) -> str:
     return f"{' and '.join(short)} beside a link of {longest:.4g} mm: a lower bound of the length makes it possible to build"
 
 
-def format_sense(task: Task) -> str:
+def format_sense(task: tasks.Task) -> str:
     """Return a note on a clockwise path that is timed by equal steps of a counter-clockwise crank; empty for other tasks."""
-    if not isinstance(task, TimedPath):
+    if not isinstance(task, tasks.TimedPath):
         return ""
     (x, y), steps = np.asarray(task.points).T, np.asarray(task.rotation)
     clockwise = 0.5 * float(np.roll(x, -1) @ y - x @ np.roll(y, -1))
     # a path like an eight has no sense
-    if clockwise <= 0.1 * float(np.ptp(x) * np.ptp(y)) or not np.allclose(steps, turn(len(steps))):
+    if clockwise <= 0.1 * float(np.ptp(x) * np.ptp(y)) or not np.allclose(steps, tasks.turn(len(steps))):
         return ""
     return (
         "the points run clockwise while the crank turns counter-clockwise; with rotation = { from = '0 deg', to = '-360 deg' } "
@@ -505,7 +481,7 @@ def report(solution: Solution) -> str:
     return assess(solution).report
 
 
-def quality_headings(task: Task) -> tuple[str, str, str]:
+def quality_headings(task: tasks.Task) -> tuple[str, str, str]:
     """Return the headings of `quality_cells`, with their units."""
     length = error_unit(task)[1]
     return f"{quality_name(task)} [{quality_unit(task)[1]}]", f"rms error [{length}]", f"worst [{length}]"
@@ -571,7 +547,7 @@ def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str
     dear = costs(solution, step, ANGLE_STEP)
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
     # an untimed path leaves the crank's rotation free, and its start, too
-    left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
+    left_out = ("crank_phase",) if isinstance(solution.task, tasks.UntimedPath) else ()
     values = _dimension_values(solution.linkage)
     for name, shift in displacements(solution).items():
         if name in left_out:
@@ -613,7 +589,7 @@ def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
         columns.setdefault(name, []).append(float(value))
 
     for rank, s in enumerate(solutions, start=1):
-        angular = isinstance(s.task, RockerFunction)
+        angular = isinstance(s.task, tasks.RockerFunction)
         unit, length = ("rad2", "rad") if angular else ("m2", "m")
         put("rank", rank)
         put(f"quality [{unit}]", s.error)

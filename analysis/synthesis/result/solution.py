@@ -59,8 +59,8 @@ class Evaluation:
     error: float
     value: float
     errors: FloatArray
-    angle_errors: FloatArray | None
-    rotation: FloatArray | None
+    angle_errors: FloatArray | None = None
+    rotation: FloatArray | None = None
     length: float = 0.0
     hausdorff: float | None = None
 
@@ -90,17 +90,14 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
 
     The errors do not depend on the sampling of a search: for an untimed path the coupler curve is a polygon of `CURVE` points.
 
+    Raises InputError if rotations are needed and not given.
+
     Parameters
     ----------
     task : Task
     linkage : Linkage
     rotation : ndarray, optional
         Crank rotations (rad) of an untimed task's stations; required except for closed paths.
-
-    Raises
-    ------
-    InputError
-        If rotations are needed and not given.
     """
     if isinstance(task, UntimedPath):
         return _evaluate_path(task, linkage, rotation)
@@ -111,7 +108,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     if isinstance(task, RockerFunction):
         left = wrap_angles(linkage.rocker_angle(at) - np.asarray(task.angle))
         error, value = _objective_values(task, np.asarray(task.weights) * left**2)
-        return Evaluation(error=error, value=value, errors=left, angle_errors=None, rotation=at)
+        return Evaluation(error=error, value=value, errors=left, rotation=at)
     points = np.asarray(task.points)
     distance = np.hypot(*(linkage.path(at) - points).T)
     weights = np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights)
@@ -143,7 +140,7 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
     curve = linkage.path(phi)
     points = np.asarray(path.points)
     if not np.isfinite(curve).all():
-        return Evaluation(error=inf, value=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
+        return Evaluation(error=inf, value=inf, errors=np.full(len(points), inf), rotation=rotation)
     distance = curve_distance(curve, points, closed=path.closed)
     weights = np.asarray(task.weights)
     normal = normal_form(task)
@@ -163,9 +160,7 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
         error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
     farthest = None if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
     value = error if farthest is None else farthest
-    return Evaluation(
-        error=error, value=value, errors=distance, angle_errors=None, rotation=rotation, hausdorff=farthest
-    )
+    return Evaluation(error=error, value=value, errors=distance, rotation=rotation, hausdorff=farthest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,12 +245,8 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 class StraightPart:
     """Straight part of a path, as the linkage traces it; computed from closely spaced points.
 
-    Attributes
-    ----------
-    travel, flatness : float
-        Extent of the traced points (m): along the wanted line from the first point to the last, and across this line.
-    begin, end : float
-        Crank rotations at the ends of the straight part (rad).
+    ``travel`` and ``flatness`` are the extents of the traced points (m): along the wanted line from the first point to the
+    last, and across this line. ``begin`` and ``end`` are the crank rotations at the ends of the straight part (rad).
     """
 
     travel: float

@@ -155,23 +155,16 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         converged=bool(result.success),
         violation=0.0 if ordered else inf,
         worst="" if ordered else "order of the stations",
-        excess="",
         status=str(result.message),
         iterations=int(result.nfev),
     )
 
 
 class Distances(NamedTuple):
-    """Distances between points of curve and target, with their derivatives with respect to the curve's points.
+    """Distances between points of curve and target (units), shape (k,), with their derivatives.
 
-    Attributes
-    ----------
-    distance : ndarray, shape (k,)
-        Distances (units).
-    before, after : ndarray of int, shape (k,)
-        Indices of the two points of the curve on which each distance depends.
-    early, late : ndarray, shape (2, k)
-        Derivatives of each distance with respect to the coordinates of these two points.
+    Each distance depends on two points of the curve with the indices ``before`` and ``after``; ``early`` and ``late``, shape
+    (2, k), are its derivatives with respect to the coordinates of these points.
     """
 
     distance: FloatArray

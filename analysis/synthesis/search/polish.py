@@ -171,22 +171,11 @@ class Polished:
     ``done`` is the number of searches. ``begun`` has, as answers, the starts that are feasible before any search.
     """
 
-    kept: tuple[Answer, ...]
-    others: tuple[Answer, ...]
-    done: int
-    interrupted: bool
+    kept: tuple[Answer, ...] = ()
+    others: tuple[Answer, ...] = ()
+    done: int = 0
+    interrupted: bool = False
     begun: tuple[Answer, ...] = ()
-
-    @classmethod
-    def from_answers(
-        cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
-    ) -> Polished:
-        """Build the record from the results of searches.
-
-        ``found`` are all answers, ``kept`` the feasible answers, best first, and ``begun`` the starts that are feasible.
-        """
-        others = tuple(a for a in found if not a.feasible)
-        return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
     def merge(self, other: Polished) -> Polished:
         """Return the answers of two searches, such as for two kinds of linkages, in one record."""
@@ -234,6 +223,10 @@ def polish(
         parts, interrupted = run_on_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
+    def record(found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool) -> Polished:
+        others = tuple(a for a in found if not a.feasible)
+        return Polished(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
+
     begun = feasible_answers([worker.judge_start(start) for start in starts])
     given = [answer for answer in begun if answer.start.given]
     # if enough starts can be refined directly, only a few are fitted by squares; not with a straight part, whose ends need more
@@ -245,7 +238,7 @@ def polish(
     kept = feasible_answers(found)
     # an interruption after the last search is ignored
     if interrupted and len(found) < len(fitted):
-        return Polished.from_answers(found, kept, True, begun)
+        return record(found, kept, True)
     interrupted = False
     if normal.quality == "squares":
         if limits.bounds_rotations:
@@ -266,7 +259,7 @@ def polish(
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.bounds_rotations:
         kept = [answer for answer in kept if worker.judge_start(answer.start).feasible]
-    return replace(Polished.from_answers(found, feasible_answers(kept), interrupted, begun), done=len(starts))
+    return replace(record(found, feasible_answers(kept), interrupted), done=len(starts))
 
 
 def _refine_in_laps(

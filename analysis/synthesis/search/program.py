@@ -54,34 +54,17 @@ HELD, ROUNDS = 2e-7, 6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """Dimensions and assembly of a linkage at which a search starts or ends, in normal form (see `Normal`).
+    """Dimensions and assembly of a linkage at which a search starts or ends, in normal form (see `Normal`)."""
 
-    Attributes
-    ----------
-    q : ndarray, shape (11,)
-        Values of `UNKNOWNS`.
-    branch : int
-        Assembly, as in `Linkage`.
-    pivot : ndarray
-        Unknowns of a moving pivot: guide angle and mean position, or length and phase of a second crank; then cosine and sine
-        coefficient of each harmonic.
-    rotation : ndarray, shape (n,), or None
-        Crank rotations of the stations if they are unknown.
-    quality : float
-        Value of the objective, in the square of the length `Normal.unit`; for a greatest error, in `Normal.unit`.
-    given : bool
-        Whether the start is a guess, not a candidate of the scan.
-    linkage : type
-        Type of the linkage; a five-bar is a `Linkage` with a second crank in ``pivot``.
-    """
-
-    q: FloatArray
-    branch: int
-    quality: float = inf
-    given: bool = False
+    q: FloatArray  # values of `UNKNOWNS`, shape (11,)
+    branch: int  # assembly, as in `Linkage`
+    quality: float = inf  # value of the objective, in `Normal.unit` squared; for a greatest error, in `Normal.unit`
+    given: bool = False  # whether the start is a guess, not a candidate of the scan
+    # unknowns of a moving pivot: guide angle and mean position, or length and phase of a second crank; then cosine and sine
+    # coefficient of each harmonic
     pivot: FloatArray = field(default_factory=lambda: np.empty(0))
-    rotation: FloatArray | None = None
-    linkage: type[Linkage] = Linkage
+    rotation: FloatArray | None = None  # crank rotations of the stations if they are unknown, shape (n,)
+    linkage: type[Linkage] = Linkage  # a five-bar is a `Linkage` with a second crank in `pivot`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,12 +77,12 @@ class Answer:
 
     start: Start
     feasible: bool
-    converged: bool
-    violation: float
-    worst: str
-    excess: str
-    status: str
-    iterations: int
+    converged: bool = False
+    violation: float = 0.0
+    worst: str = ""
+    excess: str = ""
+    status: str = ""
+    iterations: int = 0
 
     @classmethod
     def for_unjoined_links(cls, start: Start) -> Answer:
@@ -107,12 +90,9 @@ class Answer:
         return cls(
             start=replace(start, quality=inf),
             feasible=False,
-            converged=False,
             violation=inf,
             worst="loop closure",
-            excess="",
             status="the links cannot be joined at the start",
-            iterations=0,
         )
 
 
@@ -217,14 +197,8 @@ def convert_to_start(given: Linkage | Solution, normal: Normal, pivot: PivotUnkn
 def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
     """Draw random unknowns of a moving pivot, within the bounds of its stroke or length.
 
-    The coefficients of the harmonics decrease with their order.
-
-    Parameters
-    ----------
-    ground : float
-        Ground link, as a multiple of ``unit``.
-    unit : float
-        Size of the target (m).
+    ``unit`` is the size of the target (m), ``ground`` the ground link as a multiple of it. The coefficients of the harmonics
+    decrease with their order.
     """
     orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
     waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
@@ -429,22 +403,13 @@ class Program(Statement):
         places: Sequence[FloatArray] | None = None,
         small: bool = False,
     ) -> Answer:
-        """Solve the program from a start.
+        """Solve the program from a start, within a limit of iterations.
 
-        Parameters
-        ----------
-        start : Start
-        size : float
-            Magnitude of the greatest error (units) or of the greatest value, if the program minimises one of these.
-        iterations : int
-            Limit of iterations.
-        pieces : sequence of int, optional
-            Index of the triangle of each region in which the pivot must lie; by default the nearest.
-        places : sequence of ndarray, optional
-            Crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed. Without these rotations the
-            bounds are imposed on a grid, with a margin that guarantees the bounds everywhere.
-        small : bool
-            Whether the steps are small from the beginning.
+        ``size`` is the magnitude of the greatest error (units) or of the greatest value, if the program minimises one of these.
+        ``pieces`` has the index of the triangle of each region in which the pivot must lie, by default the nearest. ``places``
+        are the crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed; without them the bounds
+        are imposed on a grid, with a margin that guarantees the bounds everywhere. With ``small`` the steps are small from the
+        beginning.
         """
         z0, parameters = self.unknowns_and_parameters(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.evaluate(z0, parameters)):
@@ -480,8 +445,6 @@ class Program(Statement):
             violation=violation,
             worst=worst.name if worst else "",
             excess=worst.format_violation(violation, z) if worst else "",
-            status="",
-            iterations=0,
         )
 
     def recover_start(self, z: FloatArray, start: Start, quality: float) -> Start:

@@ -150,17 +150,9 @@ _SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
 def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
     """Find the best starts of all allowed assemblies, the best first; no two of them are similar.
 
-    Parameters
-    ----------
-    candidates : int
-        Number of allowed shapes that are tried.
-    starts : int
-        Number of starts that are kept.
+    ``candidates`` is the number of allowed shapes that are tried, ``starts`` the number of starts that are kept.
 
-    Raises
-    ------
-    InfeasibleError
-        If no shape is allowed.
+    Raises InfeasibleError if no shape is allowed.
     """
     found: list[Candidates] = []
     placed = 0

@@ -206,7 +206,7 @@ def synthesize(
     kinds = usual_kinds(task) if kinds is None else kinds
     check_arguments(task, kinds, bounds=bounds, pivot=pivot, guesses=guesses, gears=gears)
     if isinstance(task, QuickReturn | QuickSwing):
-        return _solve_in_closed_form(task, bounds, constraints, kinds, search, begun)
+        return _solve_in_closed_form(task, bounds, constraints, search, begun)
     task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     every = limits_by_kind(task, normal, bounds, constraints, kinds, gears)
@@ -219,7 +219,7 @@ def synthesize(
             )
     found: list[tuple[Solution, ...]] = []
     exact = closed_form_solutions(task) if pivot is None else ()
-    done, refused, total = Polished.from_answers((), (), False), None, 0
+    done, refused, total = Polished(), None, 0
     for limits in every:
         own = pivot or limits.second_crank(normal.unit)
         given = [guess for guess in (*guesses, *exact) if limits.admits(guess.linkage)]
@@ -290,38 +290,31 @@ def check_arguments(
         if not isinstance(guess, Solution):
             raise InputError(f"guess {number} is {guess!r}: it must be a Solution, such as the best of a Synthesis")
     alone, geared = f"but kinds are {' and '.join(map(str, kinds))} alone", "geared-five-bar" in kinds
+    sliding = tuple(kinds) == ("slider-crank",)
     unused = {
-        "gears": "it is for a geared-five-bar, " + alone if tuple(gears) != GEARS and not geared else "",
-        SECOND_LENGTH: "it is a dimension of a geared-five-bar, " + alone
-        if SECOND_LENGTH in named and not geared
-        else "",
-        "rocker_length": "a slider-crank has no rocker, " + alone
-        if "rocker_length" in named and tuple(kinds) == ("slider-crank",)
-        else "",
+        "gears": (tuple(gears) != GEARS and not geared, f"it is for a geared-five-bar, {alone}"),
+        SECOND_LENGTH: (SECOND_LENGTH in named and not geared, f"it is a dimension of a geared-five-bar, {alone}"),
+        "rocker_length": ("rocker_length" in named and sliding, f"a slider-crank has no rocker, {alone}"),
     }
-    if isinstance(task, QuickReturn | QuickSwing):
-        closed = f"a {type(task).__name__} is solved in closed form, with "
+    closed = isinstance(task, QuickReturn | QuickSwing)
+    if closed:
+        solved = f"a {type(task).__name__} is solved in closed form, with"
         unused |= {
-            "pivot": closed + "a fixed pivot" if pivot is not None else "",
-            "guesses": closed + "no search that starts from guesses" if len(guesses) else "",
-            "over": closed + "no error to trade" if over is not None else "",
+            "pivot": (pivot is not None, f"{solved} a fixed pivot"),
+            "guesses": (len(guesses) > 0, f"{solved} no search that starts from guesses"),
+            "over": (over is not None, f"{solved} no error to trade"),
         }
-    for name, reason in unused.items():
-        if reason:
+    for name, (given, reason) in unused.items():
+        if given:
             raise InputError(f"{name} has no effect: {reason}; leave it out")
+    if closed and tuple(kinds) != usual_kinds(task):
+        link = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
+        raise InputError(f"a {type(task).__name__} is a task for the {link}: kinds must be {usual_kinds(task)}")
 
 
 def _solve_in_closed_form(
-    task: QuickReturn | QuickSwing,
-    bounds: Any,
-    constraints: Sequence[Any],
-    kinds: Sequence[Kind],
-    search: Search,
-    begun: float,
+    task: QuickReturn | QuickSwing, bounds: Any, constraints: Sequence[Any], search: Search, begun: float
 ) -> Synthesis:
-    if tuple(kinds) != usual_kinds(task):
-        link = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
-        raise InputError(f"a {type(task).__name__} is a task for the {link}: kinds must be {usual_kinds(task)}")
     found = group_similar(quick_returns(task, bounds, constraints))[: search.solutions]
     seconds = perf_counter() - begun
     return Synthesis(
@@ -380,6 +373,8 @@ def improve(
 
     The optimisation starts from ``search.starts`` random motions of the pivot, and from guesses.
 
+    Raises InputError, InfeasibleError or SynthesisInterrupted as `synthesize` does.
+
     Parameters
     ----------
     task, bounds, constraints, guesses, search
@@ -391,11 +386,6 @@ def improve(
         Unknown motion of the rocker pivot.
     kept : collection of str
         Dimensions that are fixed and returned unchanged.
-
-    Raises
-    ------
-    InputError, InfeasibleError, SynthesisInterrupted
-        See `synthesize`.
     """
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
@@ -585,6 +575,9 @@ def trade_off(
     problem. A solution of a tighter limit also meets the next looser limit: a second pass in the opposite direction uses such a
     solution for the looser limit as well, unchanged or optimised again. Thus the error can only grow as the limit is tightened.
 
+    Raises InputError if ``over`` or the limits are not usable; TradeOffInterrupted on Ctrl-C, with the best solution so far at
+    each limit.
+
     Parameters
     ----------
     task : Task
@@ -597,13 +590,6 @@ def trade_off(
         constraints gives masses, load and speed.
     search : Search
         See `synthesize`; but there are at most 16384 candidates, and ``solutions`` is ignored.
-
-    Raises
-    ------
-    InputError
-        If ``over`` or the limits are not usable.
-    TradeOffInterrupted
-        On Ctrl-C, with the best solution so far at each limit.
     """
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
@@ -640,13 +626,8 @@ def solve_both_ways(
 ) -> tuple[dict[int, Solution], int | None]:
     """Solve a series of problems, from the loosest to the tightest and back, each starting from the previous solutions.
 
-    Parameters
-    ----------
-    order : sequence of int
-        Indices of the problems, the loosest first.
-    search : callable
-        Function of the index of a problem, the guesses, and whether the pass goes back from the tightest problem to the
-        loosest; it returns solutions or raises `InfeasibleError`.
+    ``order`` has the indices of the problems, the loosest first. ``search`` is a function of the index of a problem, the
+    guesses, and whether the pass goes back; it returns solutions or raises `InfeasibleError`.
 
     Returns
     -------

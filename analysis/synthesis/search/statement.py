@@ -87,9 +87,7 @@ def trace_requirement(require: Require, values: SimpleNamespace, *rotation: Any)
 
 def pivot_size(pivot: PivotUnknown | None) -> int:
     """Return how many unknowns a moving pivot has."""
-    if pivot is None:
-        return 0
-    return 2 + 2 * pivot.harmonics
+    return 0 if pivot is None else 2 + 2 * pivot.harmonics
 
 
 def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
@@ -225,9 +223,9 @@ class Statement:
         parameters = casadi.vertcat(*numbers, *peaks, *map(casadi.vec, tables))
         z, lows, highs = zip(*self._unknowns)
         self.low, self.high = np.concatenate(lows), np.concatenate(highs)
-        self.g_low = np.concatenate([np.empty(0), *(np.full(e.numel(), a) for e, a, _, _ in self._constraints)])
-        self.g_high = np.concatenate([np.empty(0), *(np.full(e.numel(), b) for e, _, b, _ in self._constraints)])
-        self.labels = [name for e, _, _, name in self._constraints for _ in range(e.numel())]
+        rows = [row[1:] for row in self._constraints for _ in range(row[0].numel())]
+        self.g_low, self.g_high = (np.array([row[end] for row in rows], dtype=float) for end in (0, 1))
+        self.labels = [label for _, _, label in rows]
         g = casadi.vertcat(casadi.SX(0, 1), *(casadi.vec(e) for e, _, _, _ in self._constraints))
         self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
 
@@ -282,15 +280,8 @@ class Statement:
         th2 = self._turns[0] * phi + p.crank_phase
         c2, s2 = casadi.cos(th2), casadi.sin(th2)
         dx, dy = self._displacement(v, phi)
-        g = self.limits.linkage.closure()(
-            c2,
-            s2,
-            p.ground_length + dx - p.crank_length * c2,
-            dy - p.crank_length * s2,
-            p.coupler_length,
-            p.rocker_length,
-            branch,
-        )
+        bx, by = p.ground_length + dx - p.crank_length * c2, dy - p.crank_length * s2
+        g = self.limits.linkage.closure()(c2, s2, bx, by, p.coupler_length, p.rocker_length, branch)
         ca, sa = casadi.cos(p.ground_angle), casadi.sin(p.ground_angle)
         px = p.point_distance * casadi.cos(p.ground_angle + p.point_angle)
         py = p.point_distance * casadi.sin(p.ground_angle + p.point_angle)
@@ -347,9 +338,8 @@ class Statement:
             if not self._by_curve:
                 most = self.least.error
                 smooth = casadi.sqrt(squares + (SMOOTH * most) ** 2) - most * hypot(1.0, SMOOTH)
-                self._constrain_nonpositive(
-                    smooth / most, ERROR, "deg" if normal.of_rocker else "mm", self._display_factor(most)
-                )
+                unit = "deg" if normal.of_rocker else "mm"
+                self._constrain_nonpositive(smooth / most, ERROR, unit, self._display_factor(most))
             values = self._trace(self.least.along, p)
             greatest = self._auxiliary("greatest", casadi.mmax(values) / size, 0.0)
             self._constrain_nonpositive(values / size - greatest, self.least.along.name, "")
@@ -482,9 +472,8 @@ class Statement:
             least = limits.way or 0.0
             if not self._judged:
                 # the step before a station may be longer than that after it
-                step[1 : self.normal.n] = casadi.fmax(
-                    casadi.fabs(step[: self.normal.n - 1]), casadi.fabs(step[1 : self.normal.n])
-                )
+                n = self.normal.n
+                step[1:n] = casadi.fmax(casadi.fabs(step[: n - 1]), casadi.fabs(step[1:n]))
             if self.pivot is not None:
                 self._bound_reach(p, v, x, step, least, tilt)
                 return
@@ -526,10 +515,9 @@ class Statement:
         least = least if self._judged else max(least, TURNING)
         for cosine in (cos(least), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
+            angle = acos(cosine) if isinstance(cosine, float) else 0.0
             for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
-                self._constrain_nonpositive(
-                    excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
-                )
+                self._constrain_nonpositive(excess, "transmission angle", "transmission", angle)
 
     def _squared_reach(self, p: Any, v: Any, x: Any) -> Any:
         """Return the square of the distance from crank pin to rocker pivot, or to the guide, at crank rotations x."""
@@ -561,9 +549,8 @@ class Statement:
         else:
             low, high = (end / unit for end in pivot.position)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            self._bound_motion(
-                lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half, half
-            )
+            factor = 1e3 * unit * half
+            self._bound_motion(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", factor, half)
         if isfinite(pivot.stroke):
             centre = self._auxiliary("middle", 0.0)
             reach = 0.5 * pivot.stroke / unit
@@ -578,14 +565,11 @@ class Statement:
         """Bound the magnitude of the slider's speed (order 1, m/rad) or acceleration (order 2, m/rad2) by ``bound``."""
         if isfinite(bound):
             scale = self.normal.unit / bound
-            self._bound_motion(
-                lambda x: scale * _series(self._casadi, v[1:], x, order=order),
-                order,
-                name,
-                unit,
-                1e3 * bound,
-                1.0 / scale,
-            )
+
+            def derivative(x: Any) -> Any:
+                return scale * _series(self._casadi, v[1:], x, order=order)
+
+            self._bound_motion(derivative, order, name, unit, 1e3 * bound, 1.0 / scale)
 
     def _bound_motion(
         self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0

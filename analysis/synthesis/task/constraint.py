@@ -18,7 +18,7 @@ from ...numerics import symbolic
 from ...units import Amount, in_si, quantity
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import Linkage, SliderCrank
-from ..linkage.machine import PINS, POSITIONS, USUAL_MAKE, MachineSpec, pin_functions
+from ..linkage.machine import PINS, USUAL_MAKE, MachineSpec, pin_functions
 from .task import Normal
 
 FloatArray = NDArray[np.float64]
@@ -245,27 +245,13 @@ class RotationRequirement(Require):
 
 
 class RotationRange(NamedTuple):
-    """Properties of a search on which a constraint depends: the crank rotations at which it must hold, and the linkages.
+    """Properties of a search on which a constraint depends: the crank rotations at which it must hold, and the linkages."""
 
-    Attributes
-    ----------
-    turn : bool
-        Whether the crank turns fully, so that the constraint must hold over a full turn.
-    rotation : ndarray or None
-        The task's crank rotations, if it has any.
-    straight : bool
-        Whether the bounds fix the coupler point on the line of B and C.
-    linkage : type
-        Type of the linkages.
-    of_slider : bool
-        Whether the coupler point is the pin of a slider-crank's slider.
-    """
-
-    turn: bool
-    rotation: FloatArray | None
-    straight: bool = False
+    turn: bool  # whether the crank turns fully, so that the constraint must hold over a full turn
+    rotation: FloatArray | None  # the task's crank rotations, if it has any
+    straight: bool = False  # whether the bounds fix the coupler point on the line of B and C
     linkage: type[Linkage] = Linkage
-    of_slider: bool = False
+    of_slider: bool = False  # whether the coupler point is the pin of a slider-crank's slider
 
     def ends(self, what: str) -> tuple[float, float]:
         """Return the ends of the range in which a constraint must hold (rad): a turn, or the range of the task's rotations.
@@ -329,12 +315,7 @@ class Demand:
 class TimeRatio(Demand):
     """Constraint: the four-bar is a crank-rocker whose slow swing lasts ``least`` to ``greatest`` times the quick swing.
 
-    For a slider-crank the constraint bounds the same ratio of the slider's two strokes.
-
-    Attributes
-    ----------
-    least, greatest : float
-        Bounds of the time ratio, which is at least 1.
+    For a slider-crank the constraint bounds the same ratio of the slider's two strokes, which is at least 1.
     """
 
     grashof: ClassVar[GrashofType | None] = "crank-rocker"
@@ -374,13 +355,7 @@ def swing_advance(d: Any) -> Any:
 @in_si(least="m", greatest="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke(Demand):
-    """Constraint: the crank of a slider-crank turns fully, and the stroke of its slider is within bounds.
-
-    Attributes
-    ----------
-    least, greatest : float
-        Bounds of the stroke (m).
-    """
+    """Constraint: the crank of a slider-crank turns fully, and its slider has a stroke from ``least`` to ``greatest`` (m)."""
 
     turns: ClassVar[bool] = True
 
@@ -577,7 +552,7 @@ class MechanicalAdvantage(Demand):
             c2, s2 = casadi.cos(th2), casadi.sin(th2)
             l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
             g = way.linkage.closure()(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
-            return POSITIONS[way.linkage.kind].speed(g, l2, l3, l4)
+            return way.linkage.driven_speed(g, l2, l3, l4)
 
         def slow(d: Any, rotation: Any) -> Any:
             both = self.least * speed(d, rotation)
@@ -640,7 +615,7 @@ class DeadCentre(_LimitPosition):
             reach = d.coupler_length + d.crank_length if stretched else d.coupler_length - d.crank_length
             # A -> C points along the crank, or against it
             c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
-            return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
+            return way.linkage.dead_gap(d, reach, c)
 
         def opposite(d: Any, rotation: float) -> Any:
             s = symbolic.library().sin(rotation + d.crank_phase)
@@ -670,7 +645,7 @@ class Toggle(_LimitPosition):
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
         def closes(d: Any, rotation: float) -> Any:
             c = symbolic.library().cos(rotation + d.crank_phase)
-            return POSITIONS[way.linkage.kind].toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
+            return way.linkage.toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
 
         return self._require_sign_change(way, closes)
 
@@ -678,13 +653,7 @@ class Toggle(_LimitPosition):
 @in_si(between="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoToggle(Demand):
-    """Constraint: there is no toggle between two crank rotations, and the links stay joined.
-
-    Attributes
-    ----------
-    between : (float, float)
-        Crank rotations, counted as in the task (rad).
-    """
+    """Constraint: no toggle ``between`` two crank rotations, counted as in the task (rad), and the links stay joined."""
 
     between: tuple[Amount, Amount]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
 from typing import Any
@@ -118,45 +118,23 @@ PivotUnknown = SliderUnknown | CrankUnknown
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """Bounds and constraints in normal form: lengths in units of the target's size, coordinates relative to its centre.
+    """Bounds and constraints in normal form: lengths in units of the target's size, coordinates relative to its centre."""
 
-    Attributes
-    ----------
-    low, high : ndarray, shape (11,)
-        Bounds of `UNKNOWNS`.
-    turn, way : float or None
-        Least transmission angles (rad): ``turn`` over a full turn of the crank, ``way`` during the task. A ``turn`` of 0 only
-        requires that the crank turns fully, a ``way`` of 0 that the links stay joined. None requires nothing.
-    grashof : str or None
-        Required Grashof type.
-    branches : tuple of int
-        Assemblies that are tried.
-    regions : tuple
-        For each region the pivot, "A" or "D", and the triangles, each shape (3, 2), in units.
-    requires : tuple of Require
-        Functions that must be at most zero, or equal to zero.
-    linkage : type
-        Type of the linkages.
-    second : (float, float), optional
-        Bounds of the second crank's length of a geared five-bar, in units.
-    ratio : float
-        Gear ratio of a geared five-bar.
-    least : MinimisedFunction, optional
-        The function that is minimised instead of an error.
-    """
-
-    low: FloatArray
-    high: FloatArray
+    low: FloatArray  # least values of `UNKNOWNS`, shape (11,)
+    high: FloatArray  # greatest values of `UNKNOWNS`, shape (11,)
+    # least transmission angles (rad) over a full turn of the crank and during the task: a `turn` of 0 only requires that the
+    # crank turns fully, a `way` of 0 that the links stay joined, None requires nothing
     turn: float | None
     way: float | None
-    grashof: str | None
-    branches: tuple[int, ...]
+    grashof: str | None  # required Grashof type
+    branches: tuple[int, ...]  # assemblies that are tried
+    # for each region the pivot, "A" or "D", and the triangles, each shape (3, 2), in units
     regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
-    requires: tuple[Require, ...]
+    requires: tuple[Require, ...]  # functions that must be at most zero, or equal to zero
     linkage: type[Linkage] = Linkage
-    second: tuple[float, float] | None = None
-    ratio: float = 1.0
-    least: MinimisedFunction | None = None
+    second: tuple[float, float] | None = None  # bounds of the second crank's length of a geared five-bar, in units
+    ratio: float = 1.0  # gear ratio of a geared five-bar
+    least: MinimisedFunction | None = None  # the function that is minimised instead of an error
 
     @property
     def gears(self) -> tuple[int, int]:
@@ -494,24 +472,15 @@ def _supports(kind: Kind, c: Constraint) -> bool:
 
 def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
     if isinstance(task, SliderFunction):
+        # the guide is the x axis, with the shaft on either side, and the coupler point is the slider
+        places: Mapping[str, Callable[[Any], Any]] = {
+            "place of the guide": lambda d: d.pivot_y + d.ground_length * np.sin(d.ground_angle),
+            "slider": lambda d: d.point_distance - d.coupler_length,
+        }
         constraints = (
             *constraints,
-            # the guide is the x axis, with the shaft on either side, and the coupler point is the slider
             Require(function=lambda d: np.cos(d.ground_angle), equal=True, name="direction of the guide"),
-            Require(
-                function=lambda d: d.pivot_y + d.ground_length * np.sin(d.ground_angle),
-                equal=True,
-                name="place of the guide",
-                scale=normal.unit,
-                unit="m",
-            ),
-            Require(
-                function=lambda d: d.point_distance - d.coupler_length,
-                equal=True,
-                name="slider",
-                scale=normal.unit,
-                unit="m",
-            ),
+            *(Require(function=f, equal=True, name=name, scale=normal.unit, unit="m") for name, f in places.items()),
         )
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds)
     given = {n: ends for n, ends in bounds.items() if n != "rocker_length"}

@@ -87,15 +87,10 @@ def interpolate_polyline(vertices: FloatArray, s: ArrayLike) -> FloatArray:
 def even_odd_area(*rings: FloatArray) -> float:
     """Compute the area of the points that closed polylines encircle an odd number of times in total (m2).
 
-    For one polyline the result is the enclosed area by the even-odd rule: both lobes of a figure-eight count, an inner loop
-    does not. For two polylines the result is the area of the symmetric difference of the enclosed areas, whose points are
-    inside exactly one of the polylines. The polylines are cut at their crossings; a face between the pieces counts if a point
-    inside the face is encircled an odd number of times.
-
-    Parameters
-    ----------
-    *rings : ndarray, shape (n, 2)
-        Closed polylines without the first point again at the end.
+    The polylines, shape (n, 2), do not repeat the first point at the end. For one polyline the result is the enclosed area by
+    the even-odd rule: both lobes of a figure-eight count, an inner loop does not. For two polylines the result is the area of
+    the symmetric difference of the enclosed areas, whose points are inside exactly one of the polylines. The polylines are cut
+    at their crossings; a face between the pieces counts if a point inside the face is encircled an odd number of times.
     """
     import shapely
 
@@ -111,18 +106,15 @@ def even_odd_area(*rings: FloatArray) -> float:
 class TargetPath:
     """A plane curve to be traced, in the order of the points.
 
+    Raises InputError if there are fewer than 3 points (2 if open), a point is not finite, two successive points or all are the
+    same, the shape is not (n, 2), or a closed curve encloses no area.
+
     Attributes
     ----------
     points : ndarray, shape (n, 2)
         Points in order (m); a closed curve does not repeat its first point at the end.
     closed : bool
         Whether the last point is joined to the first.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 3 points (2 if open), a point is not finite, two successive points or all are the same, the
-        shape is not (n, 2), or a closed curve encloses no area.
     """
 
     points: FloatArray
@@ -213,6 +205,9 @@ class TargetPath:
         Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that a rotation of the curve rotates the
         result.
 
+        Raises InputError if the curve has fewer than 6 points, or the deviation is not between zero and the deviation of the
+        smoothest possible curve (a point if closed, a straight line if open).
+
         Parameters
         ----------
         n : int
@@ -221,12 +216,6 @@ class TargetPath:
             Root mean square distance of the points from the spline (m), if the noise is known. By default lambda is chosen by
             generalised cross-validation, which assumes that the noise is not correlated from point to point; for a slow tremor
             of the hand give the deviation.
-
-        Raises
-        ------
-        InputError
-            If the curve has fewer than 6 points, or the deviation is not between zero and the deviation of the smoothest
-            possible curve (a point if closed, a straight line if open).
         """
         from scipy.interpolate import CubicSpline
         from scipy.optimize import brentq, minimize_scalar
@@ -301,21 +290,11 @@ PIECES = 2000
 
 
 def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
-    """Compute the distance of each point from a curve of straight segments, exactly (m), shape (m,).
+    """Compute the distance of each of m points, shape (m, 2), from a curve of straight segments, exactly (m), shape (m,).
 
-    Parameters
-    ----------
-    curve : array_like, shape (n, 2)
-        Vertices of the curve (m).
-    points : array_like, shape (m, 2)
-        Points whose distances are computed (m).
-    closed : bool
-        Whether the curve's last point is joined to its first.
+    ``curve`` has the vertices of the curve, shape (n, 2) in m; if ``closed``, its last point is joined to its first.
 
-    Raises
-    ------
-    InputError
-        If the curve has fewer than 2 points, or a coordinate is not finite.
+    Raises InputError if the curve has fewer than 2 points, or a coordinate is not finite.
     """
     from ...numerics.overlap import find_nearest
 
@@ -350,6 +329,8 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
 
     The integrals are sums over `PIECES` pieces of equal length by the midpoint rule, with an error of about 1e-6 of the value.
 
+    Raises InputError if the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
+
     Parameters
     ----------
     curve : array_like, shape (n, 2)
@@ -357,11 +338,6 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
     target : TargetPath
     closed : bool
         Whether the curve's last point is joined to its first.
-
-    Raises
-    ------
-    InputError
-        If the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
     """
     points = plane_points(curve, "points of the curve", 3 if closed else 2)
     if closed and target.closed:
@@ -377,19 +353,9 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
-    For an open target and a closed curve only the target's points count, as in `area_difference`. Distances are computed at the
-    vertices and at `PIECES` points at equal arc lengths. The result is below the true distance by at most half the spacing of
-    these points.
-
-    Parameters
-    ----------
-    curve, target, closed
-        As for `area_difference`.
-
-    Raises
-    ------
-    InputError
-        As for `area_difference`.
+    Arguments and errors are those of `area_difference`, and for an open target and a closed curve only the target's points
+    count, too. Distances are computed at the vertices and at `PIECES` points at equal arc lengths. The result is below the true
+    distance by at most half the spacing of these points.
     """
     points = plane_points(curve, "points of the curve", 3 if closed else 2)
     seen = np.vstack([target.points, _cut_into_pieces(closed_vertices(target.points, target.closed))[0]])
@@ -502,17 +468,10 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     """Convert a text such as ``"70 + 100*abs(sin(t/2))"`` to a function of one variable.
 
     The text may contain numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh
-    exp log sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians.
+    exp log sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians. The function
+    takes an array, and returns one of the same shape; it raises InputError if a value is not finite.
 
-    Returns
-    -------
-    callable
-        Function of an array, with a result of the same shape; it raises InputError if a value is not finite.
-
-    Raises
-    ------
-    InputError
-        If the text is not a formula of this kind; the message names the wrong part.
+    Raises InputError if the text is not a formula of this kind; the message names the wrong part.
     """
     if not isinstance(text, str):
         raise InputError(f"a formula must be a text, not {text!r}")
@@ -558,6 +517,8 @@ def path_from_formula(
 ) -> TargetPath:
     """Compute a curve from two formulas, at n equal steps of their parameter.
 
+    Raises InputError if a formula, the range or the curve is not usable; ParameterError if the unit is not a unit of length.
+
     Parameters
     ----------
     x, y : str
@@ -569,13 +530,6 @@ def path_from_formula(
     start, end : float or str
         Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve ends at its first point (to within
         1e-9 of its extent), it is closed, and that point is not repeated.
-
-    Raises
-    ------
-    InputError
-        If a formula, the range or the curve is not usable.
-    ParameterError
-        If the unit is not a unit of length.
     """
     factor = quantity(f"1 {unit}", "m", "unit")
     functions = [formula(text) for text in (x, y)]
@@ -600,6 +554,8 @@ def function_from_formula(
 ) -> tuple[FloatArray, FloatArray]:
     """Compute angles at n equal steps of the crank angle from a formula such as ``"70 + 100*abs(sin(t/2))"``.
 
+    Raises InputError if the formula or the range is not usable; ParameterError if the unit is not a unit of angle.
+
     Parameters
     ----------
     text : str
@@ -617,13 +573,6 @@ def function_from_formula(
     -------
     crank_angle, angle : ndarray, shape (n,)
         Crank angles and angles of the formula (rad).
-
-    Raises
-    ------
-    InputError
-        If the formula or the range is not usable.
-    ParameterError
-        If the unit is not a unit of angle.
     """
     factor = quantity(f"1 {unit}", "rad", "unit")
     if spacing == "chebyshev":

@@ -387,63 +387,27 @@ def covers_turn(rotation: FloatArray) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Normal:
-    """A task in normal form: targets at n stations, in units of the target's size and relative to its centre.
+    """A task in normal form: targets at n stations, in units of the target's size and relative to its centre."""
 
-    Attributes
-    ----------
-    origin : complex
-        Centre of the target (m).
-    unit : float
-        Size of the target (m): diagonal of its bounding box; for a rocker function 1 m.
-    points : ndarray of complex, shape (n,), or None
-        Target of the coupler point.
-    angle : ndarray, shape (n,), or None
-        Target of the coupler's or the rocker's angle (rad).
-    of_rocker : bool
-        Whether ``angle`` is the rocker's, relative to the ground link; otherwise it is the coupler's, in the plane.
-    of_slider : bool
-        Whether the points are positions of a slider.
-    mounting : bool
-        Whether the output angle is free.
-    leverage : float
-        Factor of an angular error (units per rad); 1 for a rocker function.
-    weights : ndarray, shape (n,)
-        Weights of the squared errors.
-    rotation : ndarray, shape (n,), or None
-        Crank rotations; None if only the order is given.
-    closed : bool
-        Whether the last station is followed by the first.
-    arc : ndarray, shape (n,)
-        Length of the target that belongs to each station.
-    outline : ndarray of complex, shape (m,), or None
-        All points of an untimed path, of which the stations are samples.
-    outline_weights : ndarray, shape (m,)
-        Weights of the errors at these points.
-    straight : Straight or None
-        Straight part, with its ends as indices of stations and its flatness in units.
-    exact : bool
-        Whether the points must be passed exactly.
-    quality : "squares", "area" or "worst"
-        What is minimised: the sum of squared errors, the area between the curves, or the greatest error.
-    """
-
-    origin: complex
-    unit: float
-    points: NDArray[np.complex128] | None
-    angle: FloatArray | None
-    of_rocker: bool = False
-    of_slider: bool = False
-    mounting: bool = False
-    leverage: float = 1.0
-    weights: FloatArray
-    rotation: FloatArray | None
-    closed: bool = False
+    origin: complex  # centre of the target (m)
+    unit: float  # size of the target (m): diagonal of its bounding box; for a rocker function 1 m
+    points: NDArray[np.complex128] | None = None  # target of the coupler point, shape (n,)
+    angle: FloatArray | None = None  # target of the coupler's or the rocker's angle (rad), shape (n,)
+    of_rocker: bool = False  # whether `angle` is the rocker's, from the ground link, not the coupler's in the plane
+    of_slider: bool = False  # whether the points are positions of a slider
+    mounting: bool = False  # whether the output angle is free
+    leverage: float = 1.0  # factor of an angular error (units per rad); 1 for a rocker function
+    weights: FloatArray  # of the squared errors, shape (n,)
+    rotation: FloatArray | None = None  # crank rotations (rad), shape (n,); None if only the order is given
+    closed: bool = False  # whether the last station is followed by the first
+    # length of the target that belongs to each station, shape (n,)
     arc: FloatArray = field(default_factory=lambda: np.empty(0))
+    # all points of an untimed path, of which the stations are samples, and the weights of the errors there, shape (m,)
     outline: NDArray[np.complex128] | None = None
     outline_weights: FloatArray = field(default_factory=lambda: np.empty(0))
-    straight: Straight | None = None
-    exact: bool = False
-    quality: Quality = "squares"
+    straight: Straight | None = None  # straight part, with its ends as indices of stations and its flatness in units
+    exact: bool = False  # whether the points must be passed exactly
+    quality: Quality = "squares"  # what is minimised: sum of squared errors, area between the curves, or greatest error
 
     @property
     def n(self) -> int:
@@ -489,7 +453,6 @@ def normal_form(task: Task) -> Normal:
         return Normal(
             origin=0.0,
             unit=1.0,
-            points=None,
             angle=np.asarray(task.angle),
             of_rocker=True,
             mounting=task.mounting,
@@ -554,9 +517,7 @@ def _path_normal(task: UntimedPath) -> Normal:
         origin=origin,
         unit=unit,
         points=(np.interp(s, length, points) - origin) / unit,
-        angle=None,
         weights=station_weights,
-        rotation=None,
         closed=closed,
         arc=half_lengths(edges, closed) / unit,
         outline=(outline - origin) / unit,
