@@ -49,10 +49,8 @@ class CaseChoice:
             drive.flow(find_mechanism(self.case.parameters))
             return drive
         except NothingFreeError as error:
-            one = (
-                error.force
-                and f"; --set {error.force}=0 frees one freedom, --set {error.force}=VALUE sets a force on it"
-            )
+            force = error.force
+            one = force and f"; --set {force}=0 frees one freedom, --set {force}=VALUE sets a force on it"
             raise InputError(
                 f"{self.case.title}: all freedoms are commanded, so that nothing can vibrate: linkwork run computes the "
                 f"torques and forces of the drives{one}"

@@ -86,9 +86,7 @@ def _print_reach(made: Mechanism) -> None:
     for number, freedom in enumerate(made.freedoms):
         found = reach(made, number)
         factor, unit = (degrees(1.0), "deg") if found.unit == "rad" else (1e3, "mm")
-        ends = [
-            f"{'beyond ' if free else ''}{factor * end:.4g}" for end, free in zip((found.low, found.high), found.open)
-        ]
+        ends = [f"{'beyond ' * free}{factor * end:.4g}" for end, free in zip((found.low, found.high), found.open)]
         span = "full turns" if found.turns else f"{' to '.join(ends)} {unit}"
         rows.append((freedom.coordinate, span, f"{degrees(asin(min(1.0, found.least))):.3g}"))
     columns = ("freedom", "range of motion", "least transmission angle [deg]")

@@ -147,10 +147,7 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
     from ..mechanisms import find_mechanism
     from ..run import case_inputs
 
-    given = {
-        **flatten(read_tables(file) if file else {}),
-        **common.changes(settings, "drive.speed='420 rpm'"),
-    }
+    given = flatten(read_tables(file) if file else {}) | common.changes(settings, "drive.speed='420 rpm'")
     speeds = [name for name, acting in case_inputs(find_mechanism(case.parameters)).items() if acting.unit == "rad/s"]
     return [
         f"{name} = {given[name]:g} has no unit and is taken in rad/s, as {given[name] / RAD_S_PER_RPM:.6g} rpm: "
@@ -174,10 +171,9 @@ def _print_extremes(title: str, result: Any) -> None:
     for name, x, si in columns:
         unit, factor = display_scale(si)
         digits = 2 if name in residuals else 6
-        numbers = [
-            f"{0.0 if abs(v) <= _ROUNDING * largest[si] else factor * v:.{digits}g}" for v in (x.min(), x.max(), x[-1])
-        ]
-        varies = x.max() - x.min() > _ROUNDING * largest[si]
+        tiny = _ROUNDING * largest[si]
+        numbers = [f"{0.0 if abs(v) <= tiny else factor * v:.{digits}g}" for v in (x.min(), x.max(), x[-1])]
+        varies = x.max() - x.min() > tiny
         least, greatest = (place(x.argmin()), place(x.argmax())) if varies else ("", "")
         rows.append((name, unit, numbers[0], least, numbers[1], greatest, numbers[2]))
     common.show_table(
@@ -272,7 +268,7 @@ def check(
             for path, interface, words in _find_fmus(model, fmu, only)
             for method in (methods if interface == "co-simulation" else methods[:1])
         ]
-        lines, verdicts = [], []
+        lines = []
         for path, interface, words, method in runs:
             in_process, through_fmu, comparison = compare_case(
                 path, case, interface=interface, method=method, tolerance=tolerance, progress=common.console.is_terminal
@@ -288,14 +284,11 @@ def check(
                 )
             if not good or path == runs[0][0]:
                 _write_comparison(common.output_folder(out) / label, case, in_process, through_fmu)
-            worst = comparison.worst
-            verdicts.append(good)
-            lines.append(
-                (path.name, words, in_process.source, worst.name, f"{worst.relative:.1e}", "pass" if good else "FAIL")
-            )
+            worst, verdict = comparison.worst, "pass" if good else "FAIL"
+            lines.append((path.name, words, in_process.source, worst.name, f"{worst.relative:.1e}", verdict))
         if len(runs) > len(methods):
             headings = ("FMU", "interface", "in process", "largest difference in", "relative", "verdict")
-            styles = [None if good else "red" for good in verdicts]
+            styles = [None if line[-1] == "pass" else "red" for line in lines]
             common.show_table(f"{case.title}, tolerance {tolerance:g}", headings, lines, styles=styles)
         count += len(runs)
     if failed:
@@ -450,10 +443,8 @@ def _print_mechanism(mechanism: Any) -> None:
     meaning = {v.name: v.description for v in mechanism.variables}
     inputs = {c.argument: meaning[c.name] for c in mechanism.channels}
     parameters = (*mechanism.mechanism_variables.values(), *mechanism.initial_variables.values())
-    rows = [
-        *((v.name, v.unit, v.description) for v in parameters),
-        *((name, unit, inputs.get(argument, "true or false")) for name, (argument, unit) in what.items()),
-    ]
+    rows = [(v.name, v.unit, v.description) for v in parameters]
+    rows += [(name, unit, inputs.get(argument, "true or false")) for name, (argument, unit) in what.items()]
     common.show_table(mechanism.title, ("in a case file", "unit", "meaning"), rows)
 
 

@@ -203,12 +203,8 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
             f"the equations of {' and '.join(foreign)} are not known: the errors of the couplings are not measured"
         )
         return
-    found = convergence(
-        described,
-        decades=decades,
-        stop_time=None if stop is None else common.quantity(stop, "s", "--stop"),
-        progress=True,
-    )
+    end = None if stop is None else common.quantity(stop, "s", "--stop")
+    found = convergence(described, decades=decades, stop_time=end, progress=True)
     rows = [
         (f"{1e3 * step:.4g}", *(f"{errors[n]:.2e}" for errors in found.errors.values()))
         for n, step in enumerate(found.steps)

@@ -73,8 +73,6 @@ def _rebuild(fmu: str) -> None:
     styles = [None if part.same else "red" for part in parts]
     show_table(fmu, ("part", "compared with", "verdict"), rows, styles=styles)
     if not all(part.same for part in parts):
-        fail(
-            "rebuild failed: the FMU differs from a build from its sources with the programs installed here",
-            CHECK_FAILED,
-        )
+        text = "rebuild failed: the FMU differs from a build from its sources with the programs installed here"
+        fail(text, CHECK_FAILED)
     say("the FMU is the same as a build from its sources", style="green")

@@ -429,14 +429,9 @@ def stability(
     _print_regions(found)
     _note_other_motion(found, reached)
     _print_runs(found)
-    more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
-    picture = figures.picture(found, title=chosen.case.title)
-    written = [
-        found.to_csv(f"{stem}.csv"),
-        found.boundaries_to_csv(f"{stem}-boundaries.csv"),
-        *more,
-        *common.save_picture(picture, stem, html=html),
-    ]
+    written = [found.to_csv(f"{stem}.csv"), found.boundaries_to_csv(f"{stem}-boundaries.csv")]
+    written += [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
+    written += common.save_picture(figures.picture(found, title=chosen.case.title), stem, html=html)
     chosen.finish(written, found.problems)
 
 

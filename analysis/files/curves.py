@@ -304,11 +304,8 @@ def _svg_scale(path: Path, root: Any) -> float:
     if box is None or lengths == [None, None]:
         return _CSS["px"]
     numbers = re.split(r"[\s,]+", box.strip())
-    if (
-        len(numbers) != 4
-        or not all(is_number(n) for n in numbers)
-        or not all(0.0 < float(n) < inf for n in numbers[2:])
-    ):
+    four = len(numbers) == 4 and all(map(is_number, numbers))
+    if not (four and all(0.0 < float(n) < inf for n in numbers[2:])):
         raise InputError(
             f"{path} has the viewBox {box!r}: it must be four numbers, the width and the height above zero"
         )

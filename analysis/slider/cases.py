@@ -166,10 +166,9 @@ class SliderCase:
 
     def __post_init__(self) -> None:
         syn.check_task("four-bar", self.synthesis.task)
-        if self.synthesis.search.kinds not in (None, ("four-bar",)):
-            raise ParameterError(
-                "search.kinds", self.synthesis.search.kinds, "be four-bar, whose pivot is moved, or left out"
-            )
+        kinds = self.synthesis.search.kinds
+        if kinds not in (None, ("four-bar",)):
+            raise ParameterError("search.kinds", kinds, "be four-bar, whose pivot is moved, or left out")
         if self.linkage is not None and not self.free and self.synthesis.bounds:
             first, limits = next(iter(self.synthesis.bounds.items()))
             raise ParameterError(
@@ -188,18 +187,13 @@ class SliderCase:
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
-        if isinstance(task, (syn.TimedPath, syn.RockerFunction)) or (
-            isinstance(task, syn.UntimedPath) and task.path.closed
-        ):
+        closed = isinstance(task, syn.UntimedPath) and task.path.closed
+        if closed or isinstance(task, syn.TimedPath | syn.RockerFunction):
             return syn.Solution.from_linkage(task, self.linkage)
         # the crank rotations along an open path are unknown: a search with all dimensions fixed finds them
-        only, seed = (syn.Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
-        return syn.synthesize(
-            task,
-            _fixed_bounds(self.linkage),
-            only,
-            search=syn.Search(seed=seed, candidates=1 << 10, starts=4, solutions=1),
-        ).best
+        only = (syn.Assembly(branch=self.linkage.branch),)
+        search = syn.Search(seed=self.synthesis.search.seed, candidates=1 << 10, starts=4, solutions=1)
+        return syn.synthesize(task, _fixed_bounds(self.linkage), only, search=search).best
 
     def find_motion(
         self, four_bar: syn.Solution, harmonics: int, guesses: tuple[syn.Solution, ...], *, progress: bool
@@ -265,13 +259,9 @@ class SliderCase:
         """Compute force, torque and pin forces of a solution's motion; the crank turns in the sense of the task."""
         assert self.drive is not None
         make, linkage = self.machine(solution), solution.linkage
-        return inverse_dynamics(
-            make.sliding_five_bar(linkage),
-            motion_of_plant(linkage),
-            solution.direction * self.drive.speed,
-            load=self._load(make, linkage),
-            samples=self.drive.samples,
-        )
+        plant, motion, load = make.sliding_five_bar(linkage), motion_of_plant(linkage), self._load(make, linkage)
+        speed = solution.direction * self.drive.speed
+        return inverse_dynamics(plant, motion, speed, load=load, samples=self.drive.samples)
 
     def run_tracking(self, drive: SliderDrive) -> TrackingResult:
         """Run the plant, which may differ from the model, under the tracking controller."""
@@ -415,9 +405,8 @@ def _read_linkage(value: Any, name: str, *, folder: Path) -> syn.Linkage:
 
 def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SliderCase:
     """Read a case from a TOML or JSON file; see `docs/slider-cases.md`. Errors are those of `load_synthesis_case`."""
-    return read_slider_case(
-        files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides
-    )
+    path = Path(path)
+    return read_slider_case(files.read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
 def read_slider_case(

@@ -175,9 +175,8 @@ class _Problem:
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
         """Return b, the position of the crank pin B relative to the guide's zero, in the frame of the guide."""
         k = self.linkage
-        return (k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length) * np.exp(
-            -1j * self.guide_angle
-        )
+        from_e = k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length
+        return from_e * np.exp(-1j * self.guide_angle)
 
     def minima(self, rotation: FloatArray, target: NDArray[np.complex128] | FloatArray) -> _Minima:
         """Return the candidates for minima of the error over the slider position, with targets of shape (n,)."""

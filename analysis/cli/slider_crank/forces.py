@@ -47,11 +47,8 @@ def forces(chosen: options.MechanismChoice, frames: Sequence[int], out: str, plo
 
     units, frames = chosen.units, tuple(dict.fromkeys(frames))
     turn = chosen.turn()
-    show_table(
-        f"{chosen.title}: {turn.sought} sought",
-        ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"),
-        _extremes(turn, frames, units),
-    )
+    headings = ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]")
+    show_table(f"{chosen.title}: {turn.sought} sought", headings, _extremes(turn, frames, units))
     for sentence in _special_places(turn, units):
         say(sentence)
     stem = str(output_folder(out) / f"{chosen.name}-forces")

@@ -97,11 +97,8 @@ def picture(
 
     p, stem = chosen.parameters, str(Path(out) / chosen.name)
     at = quantity(angle, "rad", "--angle")
-    common: dict[str, Any] = {
-        "law": chosen.law,
-        "unit": "in" if chosen.units.system == "inch" else "mm",
-        "title": chosen.title,
-    }
+    unit = "in" if chosen.units.system == "inch" else "mm"
+    common: dict[str, Any] = {"law": chosen.law, "unit": unit, "title": chosen.title}
     seen = common
     if view is not None:
         seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}

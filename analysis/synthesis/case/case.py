@@ -100,9 +100,8 @@ def requirement(text: Any, name: str = "constraints.require") -> constraint.Requ
     if np.isinf(difference(SimpleNamespace(**trial))):
         raise InputError(f"{what} has a number that is too large")
     numbers = [abs(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant)]  # type: ignore[arg-type]
-    return constraint.Require(
-        function=difference, equal=equal, name=text, scale=float(max(numbers, default=0.0)) or 1.0
-    )
+    scale = float(max(numbers, default=0.0)) or 1.0
+    return constraint.Require(function=difference, equal=equal, name=text, scale=scale)
 
 
 def _transmission(value: Any, name: str) -> float | None:
@@ -350,9 +349,8 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
     overrides : mapping, optional
         Values by dotted name that replace the file's, such as ``constraints.largest_link`` or ``search.seed``.
     """
-    return read_synthesis_case(
-        files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides
-    )
+    path = Path(path)
+    return read_synthesis_case(files.read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
 def read_synthesis_case(

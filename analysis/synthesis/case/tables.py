@@ -91,12 +91,7 @@ class Smoothing:
 
 _STRAIGHT = Table(
     tasks.Straight,
-    {
-        "start": Whole(0),
-        "end": Whole(0),
-        "rotation": Quantity("rad"),
-        "flatness": Quantity("m"),
-    },
+    {"start": Whole(0), "end": Whole(0), "rotation": Quantity("rad"), "flatness": Quantity("m")},
 )
 
 
@@ -196,9 +191,7 @@ class _ObjectiveAndRange:
 
     def _range(self) -> dict[str, Any]:
         usual = {"n": 72, "start": 0.0, "end": tau}
-        return {
-            name: default if getattr(self, name) is None else getattr(self, name) for name, default in usual.items()
-        }
+        return {name: usual[name] if (own := getattr(self, name)) is None else own for name in usual}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,9 +272,8 @@ class TimedPathTable(_Curve):
         points = self._timed_points(folder, self.rotation)
         rotation = _rotation(self.rotation, points)
         at = tasks.turn(len(points)) if rotation is None else rotation
-        return tasks.TimedPath(
-            points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective
-        )
+        weights = _weights(self.weights, at)
+        return tasks.TimedPath(points=points, rotation=rotation, weights=weights, objective=self.objective)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -474,14 +474,8 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
         if len(chosen) == count:
             break
     dyads = [Dyad(pivot=complex(a), point=complex(b)) for a, b in zip(pivots, points)]
-    return GuidanceMap(
-        task=task,
-        pivots=pivots,
-        points=points,
-        sound=sound,
-        transmission=transmission,
-        solutions=rank_solutions([build_four_bar(task, dyads[i], dyads[k]) for i, k in chosen]),
-    )
+    made = rank_solutions([build_four_bar(task, dyads[i], dyads[k]) for i, k in chosen])
+    return GuidanceMap(task=task, pivots=pivots, points=points, sound=sound, transmission=transmission, solutions=made)
 
 
 def _check_pairs(

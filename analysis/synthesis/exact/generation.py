@@ -169,13 +169,8 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
     squared = 1.0 + l2 * l2 + l4 * l4 - 2.0 * l2 * l4 * r3
     if squared <= 0.0:
         return None
-    return (
-        abs(l2),
-        sqrt(squared),
-        abs(l4),
-        crank_phase + (pi if l2 < 0.0 else 0.0),
-        mounting + (pi if l4 < 0.0 else 0.0),
-    )
+    turned, mounted = crank_phase + (pi if l2 < 0.0 else 0.0), mounting + (pi if l4 < 0.0 else 0.0)
+    return abs(l2), sqrt(squared), abs(l4), turned, mounted
 
 
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
@@ -262,11 +257,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     g = a + k * (d - a)
     same = pinned_four_bar(g, g + (1.0 - k) * (b - a), d + (1.0 - k) * (b - c), d, p)
     pin, other = a + k * (c - b), g + k * (c - d)
-    return (
-        replace(same, crank_phase=linkage.crank_phase),
-        pinned_four_bar(a, pin, other, g, p),
-        pinned_four_bar(g, other, pin, a, p),
-    )
+    second, third = pinned_four_bar(a, pin, other, g, p), pinned_four_bar(g, other, pin, a, p)
+    return replace(same, crank_phase=linkage.crank_phase), second, third
 
 
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
@@ -293,9 +285,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     if isinstance(task, TimedPath) or (isinstance(task, PrecisionPoints) and task.rotation is not None):
         return (Solution.from_linkage(task, same),)
     if isinstance(task, UntimedPath) and task.path.closed:
-        return rank_solutions(
-            [Solution.from_linkage(task, cognate) for cognate in (same, *others) if cognate.turns_fully]
-        )
+        return rank_solutions([Solution.from_linkage(task, one) for one in (same, *others) if one.turns_fully])
     assert stations is not None
     made = [Solution.from_linkage(task, same, stations)]
     way = np.interp(np.arange((len(stations) - 1) * BETWEEN + 1) / BETWEEN, np.arange(len(stations)), stations)

@@ -264,17 +264,8 @@ class MachineSpec:
         made |= self.link_masses(made)
         if sliding:
             made |= {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
-        return (
-            links
-            | made
-            | {
-                "coupler_point_distance": r,
-                "coupler_point_angle": a2,
-                "gravity": self.gravity,
-                "ground_inclination": d.ground_angle,
-                "assembly_branch": d.branch,
-            }
-        )
+        placed = {"ground_inclination": d.ground_angle, "assembly_branch": d.branch, "gravity": self.gravity}
+        return links | made | placed | {"coupler_point_distance": r, "coupler_point_angle": a2}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
         """Return the parameters of the plant for a linkage: `slider_crank` for a slider-crank, otherwise `five_bar`."""
@@ -345,11 +336,7 @@ def _trace_plant() -> tuple[Any, Any, Any]:
     return type(plant.parameters), plant.functions, law.link_mass_properties
 
 
-_DEFAULTS: dict[str, Any] = {
-    field.name: field.default
-    for field in FiveBarParameters.__dataclass_fields__.values()
-    if isinstance(field.default, float)
-}
+_DEFAULTS: dict[str, Any] = {f.name: f.default for f in fields(FiveBarParameters) if isinstance(f.default, float)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

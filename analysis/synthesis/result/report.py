@@ -117,13 +117,8 @@ def _residuals(
         angles, jacobian = linkage.link_jacobian(rotation)
         turned = 0.0 if normal.of_rocker else linkage.ground_angle
         left_angle = angles[which] + linkage.output_angle + turned - normal.angle
-        own = np.vstack(
-            [
-                jacobian[: len(PLACES), which],
-                np.ones(len(rotation)),
-                *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in columns],
-            ]
-        ).T
+        moved = [bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in columns]
+        own = np.vstack([jacobian[: len(PLACES), which], np.ones(len(rotation)), *moved]).T
         if not normal.of_rocker:
             own[:, PLACES.index("ground_angle")] += 1.0
         leverage = normal.leverage * normal.unit
@@ -471,9 +466,8 @@ def assess(solution: Solution, violated: Callable[[Solution], str] | None = None
     if violated and not violated(solution):
         broken = violated(Solution.from_linkage(solution.task, rounding.linkage, solution.evaluation.rotation))
         words += f"; rounded so, it violates a constraint: {broken}" if broken else ""
-    return Assessment(
-        solution=solution, dimensions=_dimension_rows(solution, step), rounding=words, poor=format_poor(solution)
-    )
+    rows, poor = _dimension_rows(solution, step), format_poor(solution)
+    return Assessment(solution=solution, dimensions=rows, rounding=words, poor=poor)
 
 
 def report(solution: Solution) -> str:

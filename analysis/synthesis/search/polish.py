@@ -324,9 +324,7 @@ def distinct_answers(
         if answer.start.linkage is SliderCrank:
             # without an offset a slider-crank and its mirror image about the guide are the same
             turned = np.exp(1j * q[7])
-            v = np.array(
-                [q[2] * turned.real, q[2] * turned.imag, *(side * largest * np.array([turned.real, turned.imag]))]
-            )
+            v = np.outer((q[2], side * largest), (turned.real, turned.imag)).ravel()
             q, side = np.array([*q[:2], 0.0, *q[3:7], 0.0, q[7] + q[8], *q[9:]]), 0.0
         mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
         # the crank phase of an untimed path is no dimension
@@ -432,11 +430,9 @@ class Polisher:
                 found = solve(begin)
                 if found.feasible:
                     break
-        return (
-            program.settle_extremes(found, lambda start, places: solve(start, places=places))
-            if found.feasible
-            else found
-        )
+        if not found.feasible:
+            return found
+        return program.settle_extremes(found, lambda start, places: solve(start, places=places))
 
     def with_measure(self, answer: Answer) -> Answer:
         """Return the answer with the area or the greatest distance between its path and the target as its quality."""
@@ -476,11 +472,9 @@ class Polisher:
         if self.by_least_squares:
             within = distances_from_bounds(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
-            return replace(
-                Answer.for_unjoined_links(start),
-                start=replace(start, q=clip_to_bounds(start.q, self.limits.low, self.limits.high), quality=quality),
-                feasible=within and np.isfinite(quality),
-            )
+            clipped = clip_to_bounds(start.q, self.limits.low, self.limits.high)
+            met, begun = within and np.isfinite(quality), replace(start, q=clipped, quality=quality)
+            return replace(Answer.for_unjoined_links(start), start=begun, feasible=met)
         objective: Objective = "squares" if self.normal.outline is None else "curve"
         judged = self.limits.way is not None or self.pivot is not None
         return self.program(objective, exact=True, judged=judged).judge_start(start)

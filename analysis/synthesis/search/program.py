@@ -87,13 +87,9 @@ class Answer:
     @classmethod
     def for_unjoined_links(cls, start: Start) -> Answer:
         """Return an infeasible answer for a start whose links cannot be joined."""
-        return cls(
-            start=replace(start, quality=inf),
-            feasible=False,
-            violation=inf,
-            worst="loop closure",
-            status="the links cannot be joined at the start",
-        )
+        status = "the links cannot be joined at the start"
+        nowhere = replace(start, quality=inf)
+        return cls(start=nowhere, feasible=False, violation=inf, worst="loop closure", status=status)
 
 
 def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -245,10 +241,8 @@ class Program(Statement):
     @cached_property
     def _initial_values(self) -> Any:
         """Return a function that computes the starting values of the auxiliary unknowns: greatest values, middles of ranges."""
-        casadi = self._casadi
-        return casadi.Function(
-            "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
-        )
+        casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
+        return casadi.Function("begin", [x, p], [casadi.vertcat(casadi.SX(0, 1), *self._initial)])
 
     @cached_property
     def _differentiate_motions(self) -> Any:
@@ -419,12 +413,8 @@ class Program(Statement):
         result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
         stats = solver.stats()
         answer = self.judge_unknowns(np.asarray(result["x"]).ravel(), parameters, start)
-        return replace(
-            answer,
-            converged=bool(stats["success"]),
-            status=str(stats["return_status"]),
-            iterations=int(stats["iter_count"]),
-        )
+        converged, status = bool(stats["success"]), str(stats["return_status"])
+        return replace(answer, converged=converged, status=status, iterations=int(stats["iter_count"]))
 
     def judge_unknowns(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
         """Evaluate the program at unknowns z, reached from ``start``, and return the result as an answer.
@@ -435,9 +425,8 @@ class Program(Statement):
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
         worst = self.labels[int(np.argmax(over))] if len(over) else None
-        ended = self.recover_start(
-            z, start, f * (float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0)
-        )
+        size = float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0
+        ended = self.recover_start(z, start, f * size)
         return Answer(
             start=ended,
             feasible=violation <= KEPT and bool(np.isfinite(z).all()) and isfinite(ended.quality),
@@ -449,18 +438,12 @@ class Program(Statement):
 
     def recover_start(self, z: FloatArray, start: Start, quality: float) -> Start:
         """Convert unknowns z to a start; ``start`` gives the rotations of the stations unless z has them all."""
-        end = len(UNKNOWNS) + pivot_size(self.pivot)
+        size = len(UNKNOWNS)
+        end = size + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:
             rotation = z[end : end + self.normal.n]
-        return Start(
-            q=z[: len(UNKNOWNS)],
-            branch=start.branch,
-            pivot=z[len(UNKNOWNS) : end],
-            rotation=rotation,
-            quality=quality,
-            linkage=start.linkage,
-        )
+        return replace(start, q=z[:size], pivot=z[size:end], rotation=rotation, quality=quality, given=False)
 
     def judge_start(self, start: Start) -> Answer:
         """Evaluate a start without optimising it; return an answer with its feasibility and its worst violation."""

@@ -163,9 +163,8 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
                 chunks = _merge_chunks(chunks)
             for chunk, shapes in enumerate(chunks):
                 show(float(placed))
-                found.append(
-                    _place_shapes(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1]))
-                )
+                random = np.random.default_rng([seed, chunk, branch + 1])
+                found.append(_place_shapes(normal, limits, shapes, branch, random))
                 placed += len(shapes)
     if not found:
         raise InfeasibleError(f"no shape of {limits.linkage.kind} {_impossible_limit(limits, seed)}")

@@ -216,10 +216,8 @@ class Statement:
     def _assemble(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
         """Assemble the program, its bounds and the names of its constraints."""
         casadi = self._casadi
-        peaks = [
-            *(symbol for _, *both in self._peaks for symbol in both),
-            *(casadi.vec(further) for _, further in self._along_functions),
-        ]
+        peaks = [symbol for _, *both in self._peaks for symbol in both]
+        peaks += [casadi.vec(further) for _, further in self._along_functions]
         parameters = casadi.vertcat(*numbers, *peaks, *map(casadi.vec, tables))
         z, lows, highs = zip(*self._unknowns)
         self.low, self.high = np.concatenate(lows), np.concatenate(highs)

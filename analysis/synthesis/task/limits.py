@@ -171,13 +171,8 @@ class Limits:
     @property
     def bounds_only(self) -> bool:
         """Return whether there are only bounds and no constraints, so that a least squares method is sufficient."""
-        return (
-            self.turn is None
-            and self.way is None
-            and self.grashof is None
-            and self.least is None
-            and not (self.regions or self.requires)
-        )
+        none = all(limit is None for limit in (self.turn, self.way, self.grashof, self.least))
+        return none and not (self.regions or self.requires)
 
 
 def make_limits(
@@ -267,9 +262,7 @@ def _dimension_ranges(
         usual |= dict.fromkeys(("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle"), (0.0, 0.0))
         if not caps and not set(LINKS) & set(bounds):
             usual["ground_length"] = GROUND, GROUND
-    ends = {
-        name: complete_bounds(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS
-    }
+    ends = {name: complete_bounds(name, bounds.get(name, usual[name]), usual[name]) for name in UNKNOWNS}
     for name in (*LINKS, "point_distance"):
         low, high = ends[name]
         link = name in linkage.links

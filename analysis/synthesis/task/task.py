@@ -75,10 +75,9 @@ def _rotation(values: ArrayLike | None, n: int) -> FloatArray:
         raise InputError(
             f"crank rotations {k} and {k + 1} are {rotation[k]:.6g} and {rotation[k + 1]:.6g} rad: they must go one way"
         )
-    if abs(rotation[-1] - rotation[0]) > 2.0 * pi * (1.0 + 1e-9):
-        raise InputError(
-            f"crank rotations span {abs(rotation[-1] - rotation[0]):.6g} rad: they may span one turn at most"
-        )
+    span = abs(rotation[-1] - rotation[0])
+    if span > 2.0 * pi * (1.0 + 1e-9):
+        raise InputError(f"crank rotations span {span:.6g} rad: they may span one turn at most")
     return rotation
 
 
