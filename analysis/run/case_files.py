@@ -160,10 +160,18 @@ def _tolerance(value: Any, name: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
-    """The table ``[run]``: duration (s), or else number of revolutions of the slowest crank, step (s) and tolerance of a run.
+    """The table ``[run]``: duration, step and tolerance of a run; `linkwork new` prints the explanations of its entries.
 
-    Revolutions need a crank with a constant speed. If there is one, the run by default lasts three revolutions of the slowest
-    crank, in steps of one degree of the fastest crank; otherwise the default step is 1 ms.
+    Attributes
+    ----------
+    stop_time : float, optional
+        Duration of the run. By default three revolutions of the slowest crank, if its speed is constant.
+    revolutions : float, optional
+        Duration in revolutions of the slowest crank, if its speed is constant. Not with stop_time.
+    step : float, optional
+        Time between two samples. By default the time of 1 deg of the fastest crank; 1 ms if no crank has a constant speed.
+    tolerance : float
+        Tolerance of the solver, between 1e-13 and 0.01.
     """
 
     stop_time: float | None = entry(Quantity("s"), None)
