@@ -136,7 +136,10 @@ def coexistence(
     y: ArrayLike,
     *,
     start: ArrayLike | None = None,
-    **how: Any,
+    folder: str | Path | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+    what: str = "motions",
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid over two parameters.
 
@@ -144,11 +147,28 @@ def coexistence(
     motions divided out. Where the sum of the indices shows that a motion is missing, the search starts from the motions of the
     neighbouring points, too. A motion that exists only in a short part of a row may still be missed; `find_orbits` searches a
     point closely. An undriven link that has a ratio in the drive goes round in all these motions; any other undriven link only
-    swings. `find_orbits` finds motions of both kinds.
+    swings. `find_orbits` finds motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
-    ``start``, shape (n,), is a further guess of y. If the crank is driven by a torque, this guess is required, because it gives
-    the crank speed; unless the speed follows from a motor. The other arguments and the exceptions are those of `grid`, and the
-    rows are distributed over workers and kept in the same way.
+    Parameters
+    ----------
+    operation : callable
+        See `plane`.
+    x, y : array_like, shapes (nx,) and (ny,)
+        See `grid`.
+    start : array_like, shape (n,), optional
+        A further guess. If the crank is driven by a torque, this guess is required, because it gives the crank speed; unless
+        the speed follows from a motor.
+    folder, n_jobs, progress, what
+        See `grid`.
+
+    Raises
+    ------
+    InputError
+        If an axis is empty or not finite, or ``n_jobs`` is not usable.
+    ParameterError
+        If a text on an axis is not a quantity.
+    GridInterrupted
+        On Ctrl-C.
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
@@ -158,8 +178,11 @@ def coexistence(
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
         kernels.solve_all,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what=what,
         together=_TOGETHER,
-        **how,
     )
     whole = rows[0].flow.index_of_all
     _seek_from_neighbours(operation, xs, ys, data, whole)

@@ -357,10 +357,10 @@ def compute_rows(
     shape: tuple[int, ...],
     kernel: Any,
     *,
-    folder: str | Path | None = None,
-    n_jobs: int | None = None,
-    progress: bool = False,
-    what: str = "motions",
+    folder: str | Path | None,
+    n_jobs: int | None,
+    progress: bool,
+    what: str,
     together: int = 1,
 ) -> tuple[FloatArray, int]:
     """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
