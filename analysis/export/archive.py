@@ -137,8 +137,16 @@ assert len(result) == 21, len(result)
 def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
     """Run the FMU with FMPy in a separate process, by default in twenty steps to 20 ms or to the end of one of its experiments.
 
-    ``script`` is the Python code that the process runs; its arguments are the path of the FMU and ``arguments``. BuildError is
-    raised if the run fails; the message has what the run printed.
+    Parameters
+    ----------
+    fmu : path
+    script : str
+        Python code that the process runs; its arguments are the path of the FMU and ``arguments``.
+
+    Raises
+    ------
+    BuildError
+        If the run fails; the message has what the run printed.
     """
     if script is _TRIAL:
         arguments = (repr(min(0.02, *(experiment.stop or 0.02 for experiment in read_experiments(fmu)))),)

@@ -33,9 +33,14 @@ RELATIVE, ABSOLUTE = 1e-6, 1e-6
 def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> Path:
     """Copy an FMU with its compatibility information into a subfolder of ``folder`` named after the FMU; return the subfolder.
 
-    The files are the FMU `{name}.fmu`, the inputs `{name}_in.csv`, the reference results `{name}_ref.csv`, the options of their
-    computation `{name}_ref.opt`, and `Readme.txt`. The plant in Python computes the reference results; BuildError is raised if
-    FMPy's results differ from them.
+    The files are the FMU `{name}.fmu`, the inputs `{name}_in.csv`, the reference results `{name}_ref.csv`, the options of
+    their computation `{name}_ref.opt`, and `Readme.txt`. The plant in Python computes the reference results; FMPy must get
+    the same results.
+
+    Raises
+    ------
+    BuildError
+        If FMPy's results differ from the reference.
     """
     place = Path(folder) / fmu.stem
     place.mkdir(parents=True, exist_ok=True)

@@ -38,10 +38,18 @@ References = frozenset[int]
 
 
 class Kind(NamedTuple):
-    """A kind of FMU: major version of FMI, program that generates it, and interface types, each with its capability flags.
+    """A kind of FMU.
 
-    ``suffix`` is the end of the model identifier, after the name of the mechanism's FMU. The file name has hyphens in place of
-    underscores.
+    Attributes
+    ----------
+    fmi : int
+        Major version of FMI.
+    suffix : str
+        End of the model identifier, after the name of the mechanism's FMU. The file name has hyphens in place of underscores.
+    tool : str
+        Program that generates the FMU.
+    interfaces : mapping
+        Interface types, each with its capability flags.
     """
 
     fmi: int

@@ -27,15 +27,21 @@ WORKS = (
 
 
 class Entry(NamedTuple):
-    """A variable of an FMU, whose causality may also be ``independent``.
+    """A variable of an FMU.
 
-    ``reference`` is the value reference, which is the index among the entries, from 0; the index of FMI 2.0 is greater by one.
-    ``derivative_of`` is the value reference of the variable whose time derivative this variable is.
-
-    ``role`` says where the value comes from: ``parameter`` (a field of the mechanism's parameters), ``mode``, ``initial`` (a
-    field of the state at the start), ``tolerance``, ``input`` (a channel), ``output`` (a component of ``equations.outputs``),
-    ``status``, ``time``, ``state`` (a component of the state that is no output), ``derivative`` (a component of
-    ``equations.derivative`` that is no output) or ``indicator``.
+    Attributes
+    ----------
+    variable : Variable
+        Its causality may also be ``independent``.
+    reference : int
+        Value reference, which is the index among the entries, from 0. The index of FMI 2.0 is greater by one.
+    derivative_of : int or None
+        Value reference of the variable whose time derivative this variable is.
+    role : str
+        Where the value comes from: ``parameter`` (a field of the mechanism's parameters), ``mode``, ``initial`` (a field of
+        the state at the start), ``tolerance``, ``input`` (a channel), ``output`` (a component of ``equations.outputs``),
+        ``status``, ``time``, ``state`` (a component of the state that is no output), ``derivative`` (a component of
+        ``equations.derivative`` that is no output) or ``indicator``.
     """
 
     variable: Variable
@@ -47,7 +53,10 @@ class Entry(NamedTuple):
 def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
     """Return a mechanism with other start ``values`` by FMI name; `build_native` then builds an FMU with these values.
 
-    UnknownNameError is raised if the mechanism has no such parameter or input.
+    Raises
+    ------
+    UnknownNameError
+        If the mechanism has no such parameter or input.
     """
     known = [v.name for v in mechanism.variables if v.causality in ("parameter", "input")]
     for name in values:

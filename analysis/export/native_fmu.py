@@ -90,7 +90,13 @@ _NOTES = (
 
 
 def this_platform() -> str:
-    """Return the name of the platform that this process runs on; raise BuildError if it is not in `PLATFORMS`."""
+    """Return the name of the platform that this process runs on.
+
+    Raises
+    ------
+    BuildError
+        If this platform is not in `PLATFORMS`.
+    """
     architecture = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine.machine().lower(), machine.machine().lower())
     name = f"{architecture}-{machine.system().lower()}"
     if name not in PLATFORMS:

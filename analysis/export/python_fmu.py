@@ -44,9 +44,20 @@ _NEEDS_PYTHON = (
 def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str = SOURCES) -> Path:
     """Build the Python FMU of a mechanism and return its path.
 
-    The folder ``dest`` is made if it is not there; ``sources`` is the source root that contains ``linkwork`` and the slave.
-    BuildError is raised if the sources are incomplete, or the FMU is not valid, MechanismError if the parts of the mechanism do
-    not fit together.
+    Parameters
+    ----------
+    mechanism : Mechanism
+    dest : path
+        Folder for the FMU; made if it is not there.
+    sources : path
+        Source root that contains ``linkwork`` and the slave.
+
+    Raises
+    ------
+    BuildError
+        If the sources are incomplete, or the FMU is not valid.
+    MechanismError
+        If the parts of the mechanism do not fit together.
     """
     check(mechanism)
     name = mechanism.fmu
@@ -157,9 +168,14 @@ _CONTROLLER = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\
 
 
 def build_controller(name: str, dest: Path | str = "build") -> Path:
-    """Build the Python FMU of a controller, a key of `controllers.CONTROLLERS`, and return its path.
+    """Build the Python FMU of a controller and return its path, in a subfolder named by the hash of its content.
 
-    It is in a subfolder of ``dest`` named by the hash of its content; an FMU that is already there is kept.
+    Parameters
+    ----------
+    name : str
+        A key of `controllers.CONTROLLERS`.
+    dest : path
+        Folder in which the subfolder is made; an FMU that is already there is kept.
     """
     text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
     guard = (SOURCES / "guard.c").read_bytes()

@@ -432,6 +432,12 @@ def _check_positive(name: str, value: float, unit: str) -> None:
 
 
 def check_period(period: float) -> None:
-    """Raise InputError if a sampling period (s) is not a finite number greater than zero."""
+    """Check that a sampling period (s) is finite and above zero.
+
+    Raises
+    ------
+    InputError
+        If the period is not a finite number greater than zero.
+    """
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"sampling period is {period} s: it must be a finite number greater than zero")

@@ -73,8 +73,6 @@ def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
 class Equilibrium:
     """A configuration in which a mechanism stays at rest.
 
-    ``rest["slider.position"]`` is an output of the mechanism in this configuration.
-
     Attributes
     ----------
     parameters
@@ -92,6 +90,10 @@ class Equilibrium:
         Norm of the imbalance, relative to the forces that balance each other.
     iterations : int
         Iterations of Newton's method.
+
+    Notes
+    -----
+    ``rest["slider.position"]`` is an output of the mechanism in this configuration.
     """
 
     parameters: Parameters
@@ -314,8 +316,6 @@ def find_equilibria(
 ) -> tuple[Equilibrium, ...]:
     """Find the equilibria of a mechanism, starting from a grid over all configurations; sort them by `Equilibrium.potential`.
 
-    Angles of cyclic degrees of freedom are in (-pi, pi]. If the equilibria are not isolated, only some of them are found.
-
     Parameters
     ----------
     parameters
@@ -325,6 +325,12 @@ def find_equilibria(
     held : mapping, optional
         Coordinates (rad, m) of held degrees of freedom, such as ``{"crank.angle": "30 deg"}``; 0 for a degree of freedom held
         by the inputs alone.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        The equilibria, with angles of cyclic degrees of freedom in (-pi, pi]. If they are not isolated, only some of them are
+        found.
 
     Raises
     ------

@@ -32,7 +32,13 @@ def saturate(force: float, limit: float) -> float:
 
 
 def check_limit(limit: float) -> None:
-    """Check that the limit of a force (N) is above zero. Raises InputError if the limit is not greater than zero."""
+    """Check that the limit of a force (N) is above zero.
+
+    Raises
+    ------
+    InputError
+        If the limit is not greater than zero.
+    """
     if not limit > 0.0:
         raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
 
@@ -48,9 +54,15 @@ def peak(values: FloatArray) -> float:
 
 
 class SampledController:
-    """A design as a sampled controller: it measures the state, computes the force, and holds the force for a period (s).
+    """A design as a sampled controller: it measures the state, computes the force, and holds the force for a period.
 
-    ``limit`` is the largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
+    Parameters
+    ----------
+    design : Design
+    period : float
+        Sampling period (s).
+    limit : float
+        Largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
     """
 
     @in_si(period="s")
@@ -170,7 +182,13 @@ class LoopResult:
 
     @in_si(window="s")
     def end(self, window: Amount) -> NDArray[np.bool_]:
-        """Return a mask of the samples in a window of given length (s) at the end; raise InputError if the run ended early."""
+        """Return a mask of the samples in a window of given length (s) at the end of the run.
+
+        Raises
+        ------
+        InputError
+            If the run ended early.
+        """
         if self.status:
             raise InputError(f"the run did not reach its end: {self.message}")
         return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
@@ -367,8 +385,6 @@ def control_loop(
 ) -> LoopResult:
     """Run a closed loop of a controller and the nonlinear plant; the plant runs in this process or as its FMU.
 
-    If the motion reaches the limit of assembly, or cannot be followed, the result ends there, with a status and a message.
-
     Parameters
     ----------
     parameters
@@ -388,6 +404,11 @@ def control_loop(
         The mechanism's FMU, which is run instead of the plant in this process.
     tolerance : float
         Tolerance of the plant's integrator.
+
+    Returns
+    -------
+    LoopResult
+        If the motion reaches the limit of assembly, or cannot be followed, the result ends there, with a status and a message.
 
     Raises
     ------

@@ -279,8 +279,15 @@ class LinearModel(Matrices):
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
         """Return the FMI name of a force that acts on a free degree of freedom, and the index of this degree of freedom.
 
-        By default it is the force on the last free degree of freedom, for a five-bar ``slider.force``. Raises LinearModelError
-        if there is no force of the given name.
+        Parameters
+        ----------
+        name : str, optional
+            FMI name of the force; by default the force on the last free degree of freedom, for a five-bar ``slider.force``.
+
+        Raises
+        ------
+        LinearModelError
+            If there is no such force.
         """
         mechanism, its = self.mechanism, self.layout
         channels = [mechanism.channels[n] for n in its.forces if mechanism.channels[n].freedom in its.free]
@@ -295,10 +302,22 @@ class LinearModel(Matrices):
     ) -> control.StateSpace:
         """Convert the model to a state space of python-control.
 
-        Its signals have the FMI names with underscores for dots (`signal_name`), as python-control requires. ``outputs`` and
-        ``inputs`` are FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs. Raises
-        UnknownNameError if there is no such input or output; LinearModelError if a linear model does not have one of the
-        outputs (`missing_outputs`).
+        Parameters
+        ----------
+        outputs, inputs : str or sequence of str, optional
+            FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs.
+
+        Returns
+        -------
+        control.StateSpace
+            Its signals have the FMI names with underscores for dots (`signal_name`), as python-control requires.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such input or output.
+        LinearModelError
+            If a linear model does not have one of the outputs (`missing_outputs`).
         """
         chosen = self.input_names if inputs is None else as_names(inputs)
         wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else as_names(outputs)

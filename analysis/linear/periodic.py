@@ -65,8 +65,6 @@ class Orbit(Protocol):
 class PeriodicModel(Matrices):
     """Linear models of a mechanism at s evenly spaced times of a periodic motion; see `Matrices`.
 
-    ``model[k]`` is the `LinearModel` at one of the times.
-
     Attributes
     ----------
     period : float
@@ -75,6 +73,10 @@ class PeriodicModel(Matrices):
         States of the motion at the times k period / s, k = 0 ... s - 1.
     channels : ndarray, shape (s, channels)
         Values of the mechanism's channels at these times.
+
+    Notes
+    -----
+    ``model[k]`` is the `LinearModel` at one of the times.
     """
 
     period: float
@@ -126,8 +128,12 @@ class PeriodicModel(Matrices):
     def check(self) -> None:
         """Check that the free coordinates and their rates fit together: each rate is the derivative of its coordinate.
 
-        The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled. Raises
-        InputError if a rate is not the derivative of its coordinate; the message names the coordinate.
+        The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled.
+
+        Raises
+        ------
+        InputError
+            If a rate is not the derivative of its coordinate; the message names the coordinate.
         """
         mechanism, n, secular = self.mechanism, len(self), self._mean_rates()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -148,7 +154,12 @@ class PeriodicModel(Matrices):
         """Check that the samples resolve dry friction: compare their mean of the trace of A with that of many more samples.
 
         Friction makes A large for the short time in which a rate passes through zero, which a sample hits or misses. Minus the
-        mean of the trace is the mean decay rate. Raises InputError if the mean decay rates differ.
+        mean of the trace is the mean decay rate.
+
+        Raises
+        ------
+        InputError
+            If the mean decay rates differ.
         """
         if not any(getattr(self.parameters, field_name(name)) for name in self.mechanism.names("friction")):
             return
@@ -169,9 +180,13 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the model
-        has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it. Raises LinearModelError if SciPy's
-        method fails.
+        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the
+        model has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it.
+
+        Raises
+        ------
+        LinearModelError
+            If SciPy's method fails.
         """
         from scipy.integrate import solve_ivp  # takes a fifth of a second
 

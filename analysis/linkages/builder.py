@@ -21,7 +21,13 @@ LINKAGE = "linkage"
 
 
 def read_description(tables: Mapping[str, Any]) -> Description:
-    """Read the table ``[linkage]`` of a file; raise ParameterError with its place if an entry is unknown, missing or wrong."""
+    """Read a description from the content of the table ``[linkage]`` of a file.
+
+    Raises
+    ------
+    ParameterError
+        If an entry is unknown, missing or wrong; the message gives its place in the file.
+    """
     return files.read(Description, tables, LINKAGE)
 
 
@@ -36,8 +42,14 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
     Tables without a linkage are returned unchanged. If the case names a file for its linkage, the other tables of this file
     apply as well, except its title and tuning, unless the case overrides them: see `_merge_tables`. ``folder`` is the folder
-    of the case. InputError is raised if the file named in the tables describes no linkage, or the tables name a published set
-    as well; LinkageError or ParameterError if the description is wrong.
+    of the case.
+
+    Raises
+    ------
+    InputError
+        If the file named in the tables describes no linkage, or the tables name a published set as well.
+    LinkageError, ParameterError
+        If the description is wrong.
     """
     if LINKAGE in tables and not isinstance(tables[LINKAGE], str | Mapping):
         raise ParameterError(LINKAGE, tables[LINKAGE], "be the name of a file, or a table that describes a linkage")
@@ -118,7 +130,12 @@ def load_linkage(path: str | Path) -> Mechanism:
 
 
 def load_package(path: str | Path) -> Package:
-    """Return the package of the linkage of a file; for the file and the errors see `load_linkage`."""
+    """Return the package of the linkage that a file describes, or that another file named in it describes.
+
+    Raises
+    ------
+    InputError, LinkageError, ParameterError
+    """
     return _package(_named_files(Path(path))[-1][1])
 
 

@@ -89,7 +89,17 @@ class Body:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A straight line of the body ``on`` through its point ``through``, from which positions along the line are measured."""
+    """A straight line of a body.
+
+    Attributes
+    ----------
+    on : str
+        The body.
+    through : str
+        A point of the body on the line, from which positions along the line are measured.
+    direction : float
+        Direction of the line in the body (rad).
+    """
 
     on: str = entry(_name)
     through: str = entry(_name)
@@ -182,9 +192,33 @@ def _freedom(value: Any, name: str) -> FreedomTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
-    """A planar linkage: the entries that `linkage` and the methods of `Builder` explain, in SI.
+    """A planar linkage.
 
-    There are one to four freedoms; if none is given, they are chosen automatically.
+    Attributes
+    ----------
+    name : str
+        Letters, digits and hyphens.
+    title, source : str
+        Title, and source of the data.
+    ground : mapping of str to (x, y)
+        Points of the ground (m).
+    bodies, slides, slots, gears, racks, springs : mapping
+        Parts of the linkage, by name.
+    freedoms : mapping of str to FreedomTable
+        One to four degrees of freedom, by name; if none is given, they are chosen automatically.
+    assembly : mapping of str to int
+        Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
+    friction : mapping
+        Coulomb friction proportional to the joint force, by the name of the joint: for a pin the friction radius (m), which is
+        coefficient times pin radius; for a slide or a slot the coefficient.
+    loads : tuple of PointLoad
+        Forces that can act on points; in the axes of the ground if only the point is named.
+    torques : tuple of str
+        Bodies on which torques can act.
+    gravity : float
+        Acceleration of gravity (m/s2).
+    gravity_direction : float
+        Direction of gravity (rad).
     """
 
     name: str = entry(files.text)

@@ -156,9 +156,22 @@ MECHANISM = Mechanism(
 
 
 class Package:
-    """Python package of one linkage, as source texts; if the description is wrong, LinkageError or ParameterError is raised.
+    """Python package of one linkage, as source texts.
 
-    ``files`` are the texts by file name; ``name`` is the name of the linkage as a Python identifier, with a hash of the texts.
+    Attributes
+    ----------
+    description : Description
+    structure : Structure
+    motion : Motion
+    name : str
+        Name of the linkage as a Python identifier, with a hash of the texts.
+    files : dict of str to str
+        Texts by file name.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If the description is wrong.
     """
 
     def __init__(self, description: Description) -> None:
@@ -179,8 +192,15 @@ class Package:
     def mechanism(self, folder: Path | None = None) -> Mechanism:
         """Import the package, register its mechanism and return it.
 
-        The package is stored in ``folder``, by default one in the user's cache. If the bodies cannot be joined at the start, or
-        a mechanism of Linkwork has the same name, LinkageError is raised.
+        Parameters
+        ----------
+        folder : path, optional
+            Folder in which the package is stored; by default one in the user's cache.
+
+        Raises
+        ------
+        LinkageError
+            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the same name.
         """
         name = self.description.name
         known = MECHANISMS.get(name)

@@ -210,7 +210,13 @@ def rotations(description: Description, structure: Structure, freedom: int) -> d
 
 
 def interface(description: Description, structure: Structure) -> Interface:
-    """Return the interface of a linkage; raise LinkageError or ParameterError if a value is missing or of the wrong kind."""
+    """Return the parameters of a linkage and the expressions of its points.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If a value is missing or of the wrong kind.
+    """
     drives = freedoms(description, structure)
     found: list[Parameter] = []
     points: dict[str, dict[str, tuple[str, str]]] = {GROUND: {}}

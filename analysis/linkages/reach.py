@@ -24,8 +24,20 @@ _POSITIONS = 360
 class Reach(NamedTuple):
     """Range of a freedom about its start in which the linkage can be assembled, with the other freedoms at their start.
 
-    The ends ``low`` and ``high`` are limits of assembly, or the ends of a turn or of the search; ``open`` says for each of them
-    whether the linkage can move beyond it. The clearance of a dyad is the sine of its transmission angle.
+    Attributes
+    ----------
+    freedom : int
+        Index of the degree of freedom.
+    unit : str
+        Unit of the freedom's coordinate, rad or m.
+    low, high : float
+        Ends of the range (rad, m): limits of assembly, or the ends of a turn or of the search.
+    open : (bool, bool)
+        For the low and the high end: whether the linkage can move beyond this end.
+    turns : bool
+        Whether the freedom can make a whole turn.
+    least : float
+        Least clearance of any dyad in the range; the clearance of a dyad is the sine of its transmission angle.
     """
 
     freedom: int  # index of the degree of freedom
@@ -109,7 +121,15 @@ def _seek_limit(margin: Callable[[float], float], middle: float, most: float, sa
 
 
 class DeadCentre(NamedTuple):
-    """A position at which a driven body stands still while the freedom moves on."""
+    """A position at which a driven body stands still while the freedom moves on.
+
+    Attributes
+    ----------
+    name : str
+        Name of the body if it is pinned to the ground, or of its slide if it slides on the ground.
+    at : float
+        Coordinate of the freedom (rad, m).
+    """
 
     name: str  # of the body if it is pinned to the ground, or of its slide if it slides on the ground
     at: float  # coordinate of the freedom (rad, m)

@@ -16,7 +16,23 @@ Note = Callable[[str, str, str], None]
 
 @dataclass(slots=True, kw_only=True)
 class Finding:
-    """One fault of an FMU, with the calls that show the fault; findings with the same key and severity are counted as one."""
+    """One fault of an FMU, with the calls that show the fault.
+
+    Parameters
+    ----------
+    severity : str
+        One of `SEVERITIES`.
+    key : str
+        Interface, subject and kind of the finding; findings with the same key and severity are counted as one.
+    text : str
+        The finding as a sentence.
+    calls : list of str
+        The calls of the shortest case that shows the fault.
+    replay : str
+        Name of this case, for the option `--replay`.
+    count : int
+        Number of cases that show the fault.
+    """
 
     severity: str  # one of `SEVERITIES`
     key: str  # interface, subject and kind of the finding

@@ -42,9 +42,18 @@ _GIVEN_UP = -4
 class Task:
     """A batch of runs that are solved together: the parameters, inputs and initial state of each.
 
-    ``first`` is the index in the ensemble of the first run of the batch, ``outputs`` are the indices of the outputs to record,
-    None to record states and channels. The result is saved in ``folder``; ``code`` is a hash of all code that it depends on.
-    The ``device`` "cuda" solves the runs on a graphics processor.
+    Attributes
+    ----------
+    first : int
+        Index in the ensemble of the first run of the batch.
+    outputs : tuple of int or None
+        Indices of the outputs to record; None to record states and channels.
+    folder : path or None
+        Folder in which the result is saved.
+    code : str
+        Hash of all code that the result depends on.
+    device : str or None
+        "cuda" to solve the runs on a graphics processor.
     """
 
     mechanism: Mechanism

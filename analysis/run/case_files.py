@@ -89,7 +89,15 @@ def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "")
 
 
 def load_parameters(path: str | Path) -> Parameters:
-    """Read parameters from a TOML or JSON file as `read_parameters` does; raise InputError if the file cannot be read."""
+    """Read parameters from a TOML or JSON file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    ParameterError
+        As for `read_parameters`.
+    """
     return read_parameters(files.read_tables(path))
 
 
@@ -443,9 +451,19 @@ def _make_table(
 class Case:
     """A case: all data that a run needs, in process or through the FMU, in SI units.
 
-    By default the mechanism is at rest and nothing acts on it. The run starts at 0; ``step`` is the time between samples, and
-    the communication step of the FMU (s). ``tolerance`` is as for `simulate`, and ``masses`` are empty if their origins are not
-    known.
+    Attributes
+    ----------
+    title : str
+    parameters, initial, inputs
+        Parameters, initial state and inputs of one mechanism; by default the mechanism is at rest and nothing acts on it.
+    stop_time : float
+        End of the run (s), which starts at 0.
+    step : float
+        Time between samples, and communication step of the FMU (s).
+    tolerance : float
+        Tolerance of the integrator, as for `simulate`.
+    masses : tuple of Mass
+        The masses, each with the origin of its value; empty if the origins are not known.
     """
 
     title: str
@@ -468,7 +486,11 @@ def published_case(name: str) -> Case:
 
     The run lasts three revolutions of the slowest crank, in steps of one degree of the fastest crank. If no speed
     is commanded, duration and step are those of the default experiment of the FMU.
-    UnknownNameError is raised if there is no set of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no set of that name.
     """
     entry = published_set(name)
     mechanism, inputs = find_mechanism(entry.parameters), complete_inputs(entry, None)

@@ -129,7 +129,10 @@ class TracedEquations(NamedTuple):
 def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations:
     """Return the equations as expressions in the channels and modes of a run, with the mechanism's switch on or off.
 
-    LinkworkError is raised if the equations branch on a symbol, or call functions other than `symbolic.ELEMENTARY`.
+    Raises
+    ------
+    LinkworkError
+        If the equations branch on a symbol, or call functions other than `symbolic.ELEMENTARY`.
     """
     casadi = symbolic.library()
     functions = symbolic_equations(mechanism)

@@ -67,7 +67,13 @@ class Event:
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
 
     def column(self, mechanism: Mechanism) -> int:
-        """Return the index of the output among the outputs of a mechanism; raise InputError if it has no such output."""
+        """Return the index of the output among the outputs of a mechanism.
+
+        Raises
+        ------
+        InputError
+            If the mechanism has no such output.
+        """
         if self.output not in mechanism.output_names:
             raise self._no_output(mechanism.output_names)
         return mechanism.output_names.index(self.output)

@@ -50,8 +50,12 @@ def unpacking_folder() -> str:
     """Return a folder in which to unpack any FMU: the temporary folder, or another one if PythonFMU cannot read its name.
 
     An FMU receives the URI of its folder. PythonFMU's library decodes only "%20" in the URI; if it then does not find its
-    files, it ends the process. Linkwork's own Python FMUs have a guard against this. CosimulationError is raised if there is no
-    such folder.
+    files, it ends the process. Linkwork's own Python FMUs have a guard against this.
+
+    Raises
+    ------
+    CosimulationError
+        If there is no such folder.
     """
     here = tempfile.gettempdir()
     others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
@@ -117,7 +121,12 @@ class Outcome:
 def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
     """Read the experiments that an FMU contains.
 
-    InputError is raised if the file is not an FMU, ExperimentError if the FMU has no experiments, or they cannot be read.
+    Raises
+    ------
+    InputError
+        If the file is not an FMU.
+    ExperimentError
+        If the FMU has no experiments, or they cannot be read.
     """
     check_fmu(fmu)
     with ZipFile(fmu) as archive:

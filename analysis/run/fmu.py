@@ -45,7 +45,13 @@ def _description(fmu: str | Path) -> Any:
 
 
 def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
-    """Read the model description of an FMU with FMPy; raise InputError if it cannot be read, or a variable has no name."""
+    """Read the model description of an FMU with FMPy.
+
+    Raises
+    ------
+    InputError
+        If the description cannot be read, or a variable has no name.
+    """
     try:
         with ZipFile(fmu) as archive:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
@@ -63,7 +69,13 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
 
 
 def list_interfaces(fmu: str | Path) -> dict[str, str]:
-    """Return a description of each interface of an FMU by its name in `cosimulate`; raise CosimulationError for other files."""
+    """Return the interfaces of an FMU: a description of each, by the name that `cosimulate` takes.
+
+    Raises
+    ------
+    CosimulationError
+        If the file is not an FMU.
+    """
     description = _description(fmu)
     kinds: dict[str, type[_Instance]] = {"co-simulation": FmuRun, "model-exchange": FmuModel}
     return {
@@ -238,9 +250,12 @@ class FmuRun(_Instance):
 
 
 class FmuModel(_Instance):
-    """An instance of an FMU for model exchange, in continuous-time mode.
+    """An instance of an FMU for model exchange, in continuous-time mode: states, derivatives, events.
 
-    ``states`` and ``indicators`` are the numbers of continuous states and of event indicators.
+    Attributes
+    ----------
+    states, indicators : int
+        Number of continuous states, and number of event indicators.
     """
 
     interface = "model exchange"

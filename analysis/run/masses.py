@@ -20,10 +20,18 @@ from .arguments import takes_published
 
 
 class Mass(NamedTuple):
-    """A mass of a case (kg) by the name of its FMI parameter, and where the value comes from, such as ``"of table-3.1"``.
+    """A mass of a case, and where it comes from.
 
-    ``stale`` names the values kept from the published set although the link has another length than in the set; else it is
-    empty.
+    Attributes
+    ----------
+    name : str
+        Name of the FMI parameter.
+    value : float
+        Mass (kg).
+    origin : str
+        Where the value comes from, such as ``"of table-3.1"``.
+    stale : str
+        Text that names the values kept from the published set although the link has another length than in the set; else empty.
     """
 
     name: str
@@ -126,8 +134,15 @@ def mass_origins(
 ) -> tuple[Mass, ...]:
     """Return the masses of a case, each with the origin of its value.
 
-    ``flat`` has the values that the case gives, by dotted name, before `resolve_sections`. The case takes its other values from
-    the published set ``known``, whose name is ``source``.
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    flat : mapping
+        Values that the case gives, by dotted name, before `resolve_sections`.
+    known : PublishedSet, optional
+        Published set from which the case takes its other values.
+    source : str
+        Name of this set.
     """
     mechanism = find_mechanism(parameters)
     links = {link.mass: link for link in mechanism.links}
@@ -163,6 +178,11 @@ def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
 
     Values equal to those in the most similar published set are attributed to this set; all others count as given. If only
     zeros are equal, all masses count as given.
+
+    Raises
+    ------
+    InputError
+        If the parameters are not those of a mechanism.
     """
     mechanism = find_mechanism(parameters)
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}

@@ -73,8 +73,14 @@ class Application:
 
     A request must name this machine as its host, must not come from another page, and must have the token, in the address of
     the page or in a header. The first rule refuses foreign pages that reach the server under another name. The server has two
-    paths, the page and its job; a path is looked up in a table, never on a disk. ``page`` is the HTML of the page with its
-    opening state; ``worker`` does the jobs.
+    paths, the page and its job; a path is looked up in a table, never on a disk.
+
+    Parameters
+    ----------
+    page : str
+        HTML of the page with its opening state.
+    worker : Worker
+        Worker that does the jobs.
     """
 
     def __init__(self, page: str, worker: Worker) -> None:
@@ -177,9 +183,19 @@ def allowed_hosts(port: int) -> tuple[str, ...]:
 
 
 class Server:
-    """Server for an `Application` with the HTML of its page; it listens from the start, by default at a free port.
+    """Server for an `Application`, which listens from the start.
 
-    InputError is raised if the port is taken.
+    Parameters
+    ----------
+    page : str
+        HTML of the page with its opening state.
+    port : int
+        Port; by default a free one.
+
+    Raises
+    ------
+    InputError
+        If the port is taken.
     """
 
     def __init__(self, page: str, port: int = 0) -> None:

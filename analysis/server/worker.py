@@ -50,7 +50,13 @@ class Worker:
         self._number = 0
 
     def start(self) -> None:
-        """Start the process, which then imports all that a job needs; raise LinkworkError if the system cannot."""
+        """Start the process if there is none, so that the next job does not wait for its imports.
+
+        Raises
+        ------
+        LinkworkError
+            If the system cannot start a process.
+        """
         with self._lock:
             if self._process is not None and self._process.is_alive():
                 return
@@ -69,7 +75,13 @@ class Worker:
             self._process = process
 
     def give(self, kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Begin a job and return it as `look` does; raise Busy if a job is running."""
+        """Begin a job and return it as `look` does.
+
+        Raises
+        ------
+        Busy
+            If a job is running.
+        """
         with self._lock:
             if self.look()["state"] == "running":
                 raise Busy("a job is running already: wait for it, or cancel it")

@@ -231,9 +231,19 @@ def close(
 def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
     """Close the loop by continuation: start the first point from the planar slider-crank, every other from the point before.
 
-    The rod then turns from point to point without spin. ``crank_angle`` (rad) and ``shift`` (m) are theta1 and S1 in the order
-    of the motion, numbers or arrays of shape (n,). The points must be close to each other, by 20 degrees or less. For the
-    errors raised see `close`; a step that would change the assembly is a ClosureError.
+    The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+        The mechanism.
+    crank_angle, shift : array_like
+        theta1 (rad) and S1 (m) in the order of the motion, numbers or arrays of shape (n,).
+
+    Raises
+    ------
+    InputError, AssemblyError, ClosureError
+        As `close`; a step that would change the assembly is a ClosureError.
     """
     th, s1 = broadcast_points(crank_angle, shift)
     points: list[Closure] = []

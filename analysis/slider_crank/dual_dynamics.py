@@ -355,8 +355,11 @@ class Comparison:
 def compare(turn: ForceTurn) -> Comparison:
     """Compute motion and forces of a turn again by dual matrices and compare them with vector mechanics.
 
-    Raises InputError if the slider's force is sought for a crank that a groove in its shaft shifts (the dual method does not
-    cover this case), or if the slider's force is determined at none of the angles.
+    Raises
+    ------
+    InputError
+        If the slider's force is sought for a crank that a groove in its shaft shifts (the dual method does not cover this
+        case), or if the slider's force is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):

@@ -253,9 +253,7 @@ class ForceTurn:
         return np.asarray((distances > away).all(axis=1))
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
-        """Return the components of a force or moment (N or N.m), shape (n, 3), masked where it is undetermined.
-
-        Raises InputError if there is no such vector or frame.
+        """Return the components of a force or moment, masked where it is undetermined.
 
         Parameters
         ----------
@@ -267,6 +265,16 @@ class ForceTurn:
         frame : int
             1 ground; 2 crank, i towards the crank pin; 3 rod, i along the rod from crank pin to slider pin, j perpendicular to
             rod and crank axis; 4 guide, the slider position increases along -k. Moments stay about the same points.
+
+        Returns
+        -------
+        masked array, shape (n, 3)
+            N or N.m.
+
+        Raises
+        ------
+        InputError
+            If there is no such vector or frame.
         """
         quantities.check_joint(name, frame)
         ground = self._joints[name]
@@ -288,8 +296,15 @@ class ForceTurn:
     def columns(self, units: str = "SI") -> dict[str, FloatArray]:
         """Return all quantities as columns of a file, by name with unit; masked values are NaN, the last two columns say why.
 
-        ``units`` is "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them. Raises InputError if
-        there are no such units.
+        Parameters
+        ----------
+        units : str
+            "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them.
+
+        Raises
+        ------
+        InputError
+            If there are no such units.
         """
         known = quantities.unit_table(units)
         parts: list[tuple[str, str, Any]] = [

@@ -93,7 +93,13 @@ class PeriodicShift:
 
 @in_si(shift="m")
 def constant_shift(shift: Amount) -> PeriodicShift:
-    """Return the law of a crank held at the shift S1 (m); raise InputError if ``shift`` is not finite."""
+    """Return the law of a crank held at the shift S1 (m).
+
+    Raises
+    ------
+    InputError
+        If ``shift`` is not finite.
+    """
     if not isfinite(shift):
         raise InputError(f"the shift is {shift!r} m: it must be a finite number")
     return PeriodicShift(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
@@ -103,8 +109,10 @@ def constant_shift(shift: Amount) -> PeriodicShift:
 def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     """Return the law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
-    Raises ParameterError if alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that
-    many turns.
+    Raises
+    ------
+    ParameterError
+        If alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that many turns.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
@@ -431,7 +439,10 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """Find the `ranges` of crank angles in which a mechanism can be assembled; there is at least one.
 
-    Raises AssemblyError if there is no such range; the message gives the least missing length of the rod.
+    Raises
+    ------
+    AssemblyError
+        If there is no such range; the message gives the least missing length of the rod.
     """
     found = ranges(parameters, law)
     if not found:

@@ -62,14 +62,26 @@ UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 
 
 def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return the units of a system by SI unit: an entry of `UNITS`. Raises InputError if there are no such units."""
+    """Return the units of the system ``units``, by SI unit: an entry of `UNITS`.
+
+    Raises
+    ------
+    InputError
+        If there are no such units.
+    """
     if units not in UNITS:
         raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
     return UNITS[units]
 
 
 def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return the units of a system for tables and figures: those of `unit_table`, except that "SI" has lengths in mm."""
+    """Return the units of a system for tables and figures: those of `unit_table`, except that "SI" has lengths in mm.
+
+    Raises
+    ------
+    InputError
+        If there are no such units.
+    """
     known = unit_table(units)
     return {**known, "m": ("mm", 1e-3), "m/s": ("mm/s", 1e-3)} if units == "SI" else known
 

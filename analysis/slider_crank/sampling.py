@@ -128,7 +128,15 @@ class MonteCarlo:
     def notes(self, units: str = "SI") -> tuple[str, ...]:
         """Return sentences about samples that cannot be assembled, poles, and failures of the linear estimate.
 
-        ``units`` is one of `UNITS`; with "SI" lengths are in mm. Raises InputError if there are no such units.
+        Parameters
+        ----------
+        units : str
+            One of `UNITS`. With "SI" lengths are in mm.
+
+        Raises
+        ------
+        InputError
+            If there are no such units.
         """
         known, turn = shown_units(units), self.turn
         found = []
@@ -166,7 +174,13 @@ class MonteCarlo:
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def standard_error(self, quantity: str) -> MaskedArray:
-        """Return the standard error of the mean of a quantity's samples, (n,); ParameterError if it was not sampled."""
+        """Return the standard error of the mean of the samples, shape (n,), in the unit of the quantity.
+
+        Raises
+        ------
+        ParameterError
+            If the quantity was not sampled.
+        """
         check_names((quantity,), self.spreads, "quantity")
         return cast(MaskedArray, self.spreads[quantity].deviation * self._of_the_mean)
 
@@ -198,8 +212,14 @@ class MonteCarlo:
     def place(self, quantity: str, angle: Amount) -> int:
         """Return the index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
 
-        An angle outside the sampled range is reduced by whole turns, if the shift is known to repeat after them. Raises
-        ParameterError if the quantity was not sampled; InputError if the quantity is not determined there.
+        An angle outside the sampled range is reduced by whole turns, if the shift is known to repeat after them.
+
+        Raises
+        ------
+        ParameterError
+            If the quantity was not sampled.
+        InputError
+            If the quantity is not determined there.
         """
         check_names((quantity,), self.spreads, "quantity")
         away, shift = self.turn.angle - angle, self.turn.law.periodic_shift(self.turn.parameters)

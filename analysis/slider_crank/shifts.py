@@ -60,7 +60,13 @@ class ShiftLaw(Protocol):
 @in_si(value="m")
 @dataclass(frozen=True, slots=True)
 class ConstantShift:
-    """The law of a crank that is held at a constant, finite shift S1 (m)."""
+    """The law of a crank that is held at a constant shift S1 (m).
+
+    Raises
+    ------
+    InputError
+        If the shift is not finite.
+    """
 
     value: Amount = 0.0
 
@@ -153,8 +159,12 @@ class TimeShift:
     """A shift given as a function of time with its first two derivatives, for a crank of constant speed.
 
     ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 when the
-    crank angle is 0. Raises InputError if the law is evaluated at a crank speed that is zero or varies; use an `AngleShift`
-    instead.
+    crank angle is 0.
+
+    Raises
+    ------
+    InputError
+        If the law is evaluated at a crank speed that is zero or varies; use an `AngleShift` instead.
     """
 
     value: ArrayFunction

@@ -104,7 +104,13 @@ class Sensitivities:
         return f"<Sensitivities of {', '.join(self.derivatives)} to {', '.join(self.names)} at {len(self.turn)} crank angles>"
 
     def derivative(self, quantity: str, error: str) -> MaskedArray:
-        """Return the derivative of a quantity by an error, (n,); ParameterError if this result does not have it."""
+        """Return the derivative of a quantity with respect to an error, shape (n,).
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity or error in this result.
+        """
         check_names((quantity,), self.derivatives, "quantity")
         check_names((error,), self.names, "error")
         return cast(MaskedArray, self.derivatives[quantity][self.names.index(error)])

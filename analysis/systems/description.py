@@ -82,7 +82,15 @@ def _connections(value: Any, name: str) -> dict[End, End]:
 class System:
     """A system of connected parts, as a file describes it.
 
-    ``connections`` has for each connected input the output to which it is connected; file names are relative to ``folder``.
+    Attributes
+    ----------
+    title : str
+    parts : mapping of str to PartTable
+    connections : mapping of End to End
+        For each connected input, the output to which it is connected.
+    run : RunTable
+    folder : path
+        Folder to which file names are relative.
     """
 
     title: str = entry(files.text, "")
@@ -171,8 +179,17 @@ class System:
     def wiring(self, *, fmi: int = 2) -> Wiring:
         """Build the FMUs of the system in the user's cache, and return the wiring.
 
-        ``fmi`` is the version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0. BuildError is
-        raised if an FMU cannot be built, WiringError or UnknownNameError if a connection is not valid.
+        Parameters
+        ----------
+        fmi : int
+            Version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0.
+
+        Raises
+        ------
+        BuildError
+            If an FMU cannot be built.
+        WiringError, UnknownNameError
+            If a connection is not valid.
         """
         place = code_folder("systems")
         parts = {name: Part.from_fmu(name, m.build(place, fmi), m.values) for name, m in self.members.items()}
@@ -250,7 +267,13 @@ def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str
 
 
 def load_system(path: str | Path) -> System:
-    """Read a system from a TOML file; raise InputError or ParameterError if it cannot be read, or an entry is wrong."""
+    """Read a system from a TOML file.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If the file cannot be read, or an entry is wrong.
+    """
     return replace(files.read(System, files.read_tables(path), ""), folder=Path(path).parent)
 
 

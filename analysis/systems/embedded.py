@@ -24,8 +24,12 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     """Write a system as C files into a folder, and return the names of the files to compile.
 
     These are ``host.c``, which is the master with its clock, and one file for each native FMU. The header ``system.h`` has the
-    start values and the connections. WiringError is raised if a part is neither a native FMU with its sources nor a controller
-    known to the host.
+    start values and the connections.
+
+    Raises
+    ------
+    WiringError
+        If a part is neither a native FMU with its sources nor a controller known to the host.
     """
     folder = Path(folder)
     files = {name: (resources.files(__package__) / name).read_text(encoding="utf-8") for name in (_HOST, _CONTROLLERS)}
@@ -64,7 +68,10 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
 def build_host(wiring: Wiring, folder: str | Path) -> Path:
     """Write a system as C files into a folder, compile them there with Zig, and return the program; see ``host.c``.
 
-    BuildError is raised if the machine does not run Linux, whose clock the host uses, or the files do not compile.
+    Raises
+    ------
+    BuildError
+        If the machine does not run Linux, whose clock the host uses, or the files do not compile.
     """
     architecture, _, name = this_platform().partition("-")
     if name != "linux":

@@ -57,10 +57,18 @@ class _Model:
 
 
 class JoinedSystem:
-    """A system, whose parts are all mechanisms or controllers, as one set of equations.
+    """A system as one set of equations.
 
-    WiringError is raised if a part is an FMU, whose equations are not known, or the values in an algebraic loop depend on each
-    other nonlinearly.
+    Parameters
+    ----------
+    system : System
+        A system whose parts are all mechanisms or controllers.
+
+    Raises
+    ------
+    WiringError
+        If a part is an FMU, whose equations are not known, or the values in an algebraic loop depend on each other
+        nonlinearly.
     """
 
     def __init__(self, system: System) -> None:
@@ -156,7 +164,10 @@ class JoinedSystem:
     def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
         """Integrate the system with SciPy's DOP853, and return all outputs at multiples of ``step`` (s).
 
-        IntegrationError is raised if the integration does not reach the end.
+        Raises
+        ------
+        IntegrationError
+            If the integration does not reach the end.
         """
         times = step * np.arange(round(stop_time / step) + 1)
         marks = self._sample_times(stop_time)

@@ -30,7 +30,10 @@ STEP = "linkwork.communication-step"
 def write_ssp(wiring: Wiring, path: str | Path) -> Path:
     """Write a system as an ``.ssp``: its FMUs, connections with units, start values of each part as ``.ssv``, and the diagram.
 
-    MissingLibraryError is raised if pyssp-standard is not installed.
+    Raises
+    ------
+    MissingLibraryError
+        If pyssp-standard is not installed.
     """
     with output(path) as (target, final), tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "system.ssp"

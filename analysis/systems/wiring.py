@@ -170,10 +170,23 @@ _POWERS = (("N.m", "rad/s"), ("N", "m/s"))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
-    """The parts of a system and their connections; WiringError or UnknownNameError is raised if a connection is wrong.
+    """The parts of a system and their connections.
 
-    ``connections`` has for each connected input the output to which it is connected. The end of a run and the default
-    communication step are in s; ``remarks`` are sentences on entries of the system's file that have no effect.
+    Attributes
+    ----------
+    title : str
+    parts : mapping of str to Part
+    connections : mapping of End to End
+        For each connected input, the output to which it is connected.
+    stop_time, step : float
+        End of a run, and default communication step (s).
+    remarks : tuple of str
+        Sentences on entries of the system's file that have no effect.
+
+    Raises
+    ------
+    WiringError, UnknownNameError
+        If a connection is wrong.
     """
 
     title: str

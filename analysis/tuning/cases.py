@@ -65,8 +65,14 @@ class TuneTable:
 class TuningCase:
     """A case file of a tuning.
 
-    ``tables`` are the tables of the file without ``[tune]``: the mechanism and its inputs. The names of files in the case are
-    relative to ``folder``.
+    Attributes
+    ----------
+    title : str
+    wish : Wish
+    tables : mapping
+        The tables of the file without ``[tune]``: the mechanism and its inputs.
+    folder : path
+        Folder to which the names of files in the case are relative.
     """
 
     title: str
@@ -86,7 +92,13 @@ class TuningCase:
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
-    """Read a tuning case from a TOML or JSON file, see `docs/tuning.md`; InputError or ParameterError if not usable."""
+    """Read a tuning case from a TOML or JSON file; see `docs/tuning.md`.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If the file cannot be read, or an entry is not usable.
+    """
     return read_tuning_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 

@@ -28,9 +28,16 @@ FloatArray = NDArray[np.float64]
 class Change:
     """A parameter of the mechanism, or a quantity of its drive, that may be changed.
 
-    ``name`` is an FMI name, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``. The value is
-    bounded by ``low`` and ``high``; ``tolerance`` is the unit in which the change is measured (all in SI). ``given`` is the
-    tolerance as the user wrote it, if the bounds follow from it; otherwise it is empty.
+    Attributes
+    ----------
+    name : str
+        FMI name, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
+    low, high : float
+        Bounds of the value (SI).
+    tolerance : float
+        Unit in which the change is measured (SI).
+    given : str or float
+        The tolerance as the user wrote it, if the bounds follow from it; otherwise empty.
     """
 
     name: str

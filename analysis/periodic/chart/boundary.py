@@ -42,8 +42,15 @@ _DIFFERENCE = 1e-7
 class CrossingCurve:
     """A curve of folds, period doublings or torus points over two parameters.
 
-    ``points`` are the values of the two parameters along the curve, shape (m, 2), and ``orbits`` the m motions there; ``ends``
-    tell why the curve ends at its first and at its last point.
+    Attributes
+    ----------
+    kind : Crossing
+    points : ndarray, shape (m, 2)
+        Values of the two parameters along the curve.
+    orbits : tuple of PeriodicOrbit
+        The orbit at each point.
+    ends : (End, End)
+        Why the curve ends at its first and at its last point.
     """
 
     kind: Crossing
@@ -64,10 +71,27 @@ def follow_crossing(
 ) -> CrossingCurve:
     """Follow a curve of folds, period doublings or torus points in both directions, up to the edges of a box in a plane.
 
-    ``orbit`` is an orbit of the ``kind`` on the curve, or close to it, at the values ``place`` of the two parameters. ``x`` and
-    ``y`` are the ranges of the parameters, which form the box; ``at`` gives mechanism and drive at a point: see `plane`. There
-    are at most ``most_points`` points in each direction. Raises InputError if the kind is a branch point: there the motion is
-    not unique, and the equations of the curve are singular; ContinuationError if no point of the curve is near the orbit.
+    Parameters
+    ----------
+    at : callable
+        Function that returns mechanism and drive at a point of the plane: see `plane`.
+    orbit : PeriodicOrbit
+        An orbit on the curve, or close to it.
+    kind : Crossing
+        Kind of the points on the curve: fold, period doubling or torus point, not branch point.
+    place : (float, float)
+        Values of the two parameters for this orbit.
+    x, y : (float, float)
+        Ranges of the two parameters, which form the box.
+    most_points : int
+        Greatest number of points in each direction.
+
+    Raises
+    ------
+    InputError
+        If the kind is a branch point: there the motion is not unique, and the equations of the curve are singular.
+    ContinuationError
+        If no point of the curve is near the orbit.
     """
     if kind is Crossing.BRANCH_POINT:
         raise InputError("kind is a branch point, whose curve has singular equations: stability_chart traces it")
@@ -180,11 +204,19 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
-    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane, see `plane`.
+    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
 
-    Each orbit is sought from the orbit found last (first from ``start``, see `find_orbit`), so that neighbouring points stay on
-    one branch, then from the orbits at the nearest points of ``near``, a grid over the same plane, then from all starts of
-    `newton_orbit`. Results are cached.
+    Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
+    nearest points of the grid ``near``, then from all starts of `newton_orbit`. Results are cached.
+
+    Parameters
+    ----------
+    operation : callable
+        See `plane`.
+    start : array_like, shape (n,), optional
+        Guess of the first orbit: see `find_orbit`.
+    near : Grid, optional
+        A grid over the same plane, whose orbits are further guesses.
     """
     first = None if start is None else np.array(start, dtype=float)
     last = first
@@ -249,9 +281,6 @@ def removing_damping(
 ) -> RemovingDamping:
     """Find the damping at which a region of instability vanishes: the least value of its test function over x is then zero.
 
-    The search for the least value begins from a number of ``samples`` of x; ``tolerance`` is relative to the upper end of the
-    range of damping.
-
     Parameters
     ----------
     test : callable
@@ -259,7 +288,18 @@ def removing_damping(
     x : (float, float)
         Range of the other parameter x; it contains this region and no other region.
     damping : (float, float)
-        Range of damping: the region exists at the lower end and not at the upper end; if not, RemovalError is raised.
+        Range of damping in which the region vanishes: the region exists at the lower end and not at the upper end.
+    samples : int
+        Number of samples of x from which the search for the least value begins.
+    tolerance : float
+        Tolerance of the damping, relative to the upper end of its range.
+
+    Raises
+    ------
+    RemovalError
+        If the region does not exist at the lower end, or still exists at the upper end.
+    LinkworkError
+        If the test function raises it.
     """
 
     def least(d: float) -> float:

@@ -63,8 +63,16 @@ _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
 class Axis:
     """An axis of a chart as it is printed and drawn: in the units of the tables, such as rpm and mm.
 
-    ``name`` is the parameter's FMI name, ``unit`` the unit for printing and drawing, ``factor`` the factor to it from ``si``,
-    the SI unit.
+    Attributes
+    ----------
+    name : str
+        FMI name.
+    unit : str
+        Unit for printing and drawing.
+    factor : float
+        Factor from SI to ``unit``.
+    si : str
+        SI unit.
     """
 
     name: str
@@ -568,8 +576,12 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
     """Return the default range of the parameter ``name`` on an axis of a chart, in SI.
 
     The range of a crank speed lies around the natural frequency, if `natural_frequency` can compute it. Any other range lies
-    around the present value. Raises InputError if the present value is not above zero, or the parameter cannot vary in this
-    drive.
+    around the present value.
+
+    Raises
+    ------
+    InputError
+        If the present value is not above zero, or the parameter cannot vary in this drive.
     """
     variables.require_variable(parameters, drive, name)
     if name in variables.speed_names(find_mechanism(parameters)):
@@ -585,8 +597,12 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 def damping_name(mechanism: Mechanism) -> str:
     """Return the FMI name of the damping that is an axis of a chart by default.
 
-    It is the damping of the first degree of freedom other than the crank; if this has no damping, another damping. Raises
-    InputError if the mechanism has no damping.
+    It is the damping of the first degree of freedom other than the crank; if this has no damping, another damping.
+
+    Raises
+    ------
+    InputError
+        If the mechanism has no damping.
     """
     first = [mechanism.freedoms[number].coordinate for number in oscillating_freedoms(mechanism)[:1]]
     own = [name for coordinate in first for name in mechanism.names("damping", coordinate)]

@@ -45,11 +45,17 @@ _USED = PLAIN, VARIATIONAL, IN_LANES + VARIATIONAL, IN_LANES + GAP
 def largest_multipliers(
     rows: Sequence[Parameters], drives: Sequence[Drive], guesses: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row, given by parameters and drive.
+    """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row.
 
     Newton's method starts from the orbit of the neighbouring mechanism, then from the guesses; neighbours in the sequence
-    should therefore have similar parameters. ``guesses``, shape (n,) or (k, n), are a guess of y for the first mechanism, and
-    further guesses that are used if the first leads to no orbit; see `find_orbit`.
+    should therefore have similar parameters.
+
+    Parameters
+    ----------
+    rows, drives : sequences of length m
+        Parameters and drive of each mechanism.
+    guesses : array_like, shape (n,) or (k, n), optional
+        Guess of y for the first mechanism, and further guesses that are used if the first leads to no orbit; see `find_orbit`.
 
     Returns
     -------
@@ -82,9 +88,12 @@ def _solve_row(
 
 
 class GridInterrupted(Interrupted):
-    """The computation of a grid was interrupted with ``done`` of ``rows`` rows finished.
+    """The computation of a grid was interrupted; the finished rows are kept, and the same call continues from them.
 
-    The finished rows are kept, and the same call continues from them.
+    Attributes
+    ----------
+    done, rows : int
+        Number of finished rows, and number of all rows.
     """
 
     def __init__(self, done: int, rows: int, folder: Path) -> None:
@@ -418,7 +427,11 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
 
     Each point lies at least a tenth of the range away from the edges, so that a figure shows its mark whole, unless unstable
     points lie only next to the edges. The third point has the smallest margin of stability that a long run can still measure.
-    Return row and column of each point; there may be fewer than three.
+
+    Returns
+    -------
+    list of (int, int)
+        Row and column of each point; there may be fewer than three.
     """
     margin = 1.0 - found.largest
     if margin.count() == 0:

@@ -157,7 +157,10 @@ class Drive:
     def reference(self, mechanism: Mechanism) -> Crank:
         """Return the crank to which ``speed``, ``torque`` and ``motor`` refer; its angle is the independent variable.
 
-        Raises InputError if the mechanism has no crank, or has several cranks and ``crank`` names none of them.
+        Raises
+        ------
+        InputError
+            If the mechanism has no crank, or has several cranks and ``crank`` names none of them.
         """
         return find_crank(mechanism, self.crank)
 
@@ -183,8 +186,11 @@ class Drive:
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """Return how each degree of freedom that has a mode is driven: one of `Mode.arguments`, by the name of the mode.
 
-        Raises InputError if ``modes`` names a mode that no degree of freedom other than the crank has, or gives it a value that
-        does not exist.
+        Raises
+        ------
+        InputError
+            If ``modes`` names a mode that no degree of freedom other than the crank has, or gives it a value that does not
+            exist.
         """
         return _arguments(
             mechanism,
@@ -196,7 +202,13 @@ class Drive:
         )
 
     def flow(self, mechanism: Mechanism) -> Flow:
-        """Return the flow of the mechanism with this drive; raise InputError if it cannot have it, or nothing is free."""
+        """Return the flow of the mechanism with this drive.
+
+        Raises
+        ------
+        InputError
+            If the mechanism cannot have this drive, or no degree of freedom is free.
+        """
         crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
             what = "speed of" if self.speed_drive else "torque on"
@@ -229,8 +241,19 @@ class Drive:
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
         """Return the drive for motions in which undriven links make given numbers of whole turns in ``turns`` common periods.
 
-        ``rounds`` is the number of whole turns of each link, by the FMI name of the link's coordinate. The second result is the
-        number of common periods of the new drive in the same time: fewer if the common period has become longer.
+        Parameters
+        ----------
+        mechanism : Mechanism
+        rounds : mapping of str to int
+            Number of whole turns of each link, by the FMI name of the link's coordinate.
+        turns : int
+            Number of common periods of this drive.
+
+        Returns
+        -------
+        drive : Drive
+        turns : int
+            Number of common periods of the new drive in the same time: fewer if the common period has become longer.
         """
         made, freedoms = self.flow(mechanism), {f.coordinate: f for f in mechanism.freedoms}
         ratios = {n: Fraction(times * _whole_turns(freedoms[n]), turns * made.turns) for n, times in rounds.items()}
@@ -240,8 +263,12 @@ class Drive:
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
         """Return the drive vector: channels, motor parameters, held coordinates and ratios, in the order that `Flow` describes.
 
-        Raises UnknownNameError if a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the
-        name of a torque; InputError if a force has no effect in this drive, or if ``held`` names a coordinate that is not held.
+        Raises
+        ------
+        UnknownNameError
+            If a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the name of a torque.
+        InputError
+            If a force has no effect in this drive, or if ``held`` names a coordinate that is not held.
         """
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
@@ -427,10 +454,22 @@ def steady_drive(
 ) -> Drive:
     """Return the drive of a periodic motion from the inputs of a run; the inputs must not vary in time.
 
-    The state at the start, ``initial``, gives the positions of held degrees of freedom: all those that are neither free nor the
-    crank. ``speed`` (rad/s) and ``torque`` (N.m) replace the drive of the crank in ``inputs``; other commanded cranks keep
-    their ratios to the crank. Raises VaryingInputError if an input varies; InputError if nothing drives the crank, or if a
-    degree of freedom that is not a crank is commanded at a speed other than zero.
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    inputs : Inputs, optional
+    initial : state at the start, optional
+        State that gives the positions of held degrees of freedom: all those that are neither free nor the crank.
+    speed, torque : optional
+        Crank speed (rad/s) and torque on the crank (N.m), instead of the drive of the crank in ``inputs``; other commanded
+        cranks keep their ratios to the crank.
+
+    Raises
+    ------
+    VaryingInputError
+        If an input varies.
+    InputError
+        If nothing drives the crank, or if a degree of freedom that is not a crank is commanded at a speed other than zero.
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = run.check_run(mechanism, inputs, initial)
@@ -651,9 +690,16 @@ def spread_starts(
     motions may be much smaller than the room that the links have. If a coordinate can move much further in one direction than
     in the other, ``count`` further starts fill the ellipse about the middle of the range of this coordinate.
 
-    Under a torque the crank speeds of the starts lie around the crank speed in the first guess of y, ``guess``, shape (n,).
-    ``count`` is a power of two. Each ``number``, the seed of the sequence, gives another set of starts. Callers that take
-    several sets give the result of `start_ranges` as ``ranges``.
+    Parameters
+    ----------
+    guess : ndarray, shape (n,)
+        First guess of y; under a torque the crank speeds of the starts lie around the crank speed in ``guess``.
+    count : int
+        Number of starts in an ellipse, a power of two.
+    number : int
+        Index of the set of starts, which is the seed of the sequence: each index gives other starts.
+    ranges : tuple of ndarray, optional
+        Result of `start_ranges`, for callers that take several sets.
     """
     flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2

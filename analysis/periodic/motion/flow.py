@@ -63,8 +63,17 @@ def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
 def find_crank(mechanism: Mechanism, name: str = "") -> Crank:
     """Return the crank of a mechanism, by name if there are several.
 
-    ``name`` is the FMI name of the coordinate of the crank, of its commanded speed or of the torque on it. Raises InputError if
-    the mechanism has no crank, if it has several and no name is given, or if no crank has that name.
+    Parameters
+    ----------
+    mechanism : Mechanism
+    name : str
+        FMI name of the coordinate of the crank, of its commanded speed or of the torque on it; may be left out where there is
+        one crank.
+
+    Raises
+    ------
+    InputError
+        If the mechanism has no crank, if it has several and no name is given, or if no crank has that name.
     """
     cranks = find_cranks(mechanism)
     if not cranks:
@@ -374,7 +383,7 @@ class Crossing(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StabilityVerdict:
-    """A verdict on the stability of a periodic motion; it has no truth value (`VerdictError`): compare ``stability``.
+    """A verdict on the stability of a periodic motion; it has no truth value: compare ``stability``.
 
     Attributes
     ----------
@@ -385,6 +394,11 @@ class StabilityVerdict:
         Size of the margin below which the verdict is MARGINAL. A system without damping is never better than MARGINAL.
     largest_multiplier : complex
         The multiplier of the greatest modulus.
+
+    Raises
+    ------
+    VerdictError
+        If the verdict is used as a truth value.
     """
 
     stability: Stability
@@ -407,9 +421,21 @@ class StabilityVerdict:
 
 
 def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
-    """Return the Floquet multipliers, the largest modulus first: complex, shape (..., n).
+    """Return the Floquet multipliers, the largest modulus first.
 
-    ``monodromy`` is one matrix or many, shape (..., n, n). Raises InputError if an entry is not finite.
+    Parameters
+    ----------
+    monodromy : array_like, shape (..., n, n)
+        One matrix or many.
+
+    Returns
+    -------
+    ndarray of complex, shape (..., n)
+
+    Raises
+    ------
+    InputError
+        If an entry is not finite.
     """
     matrix = np.asarray(monodromy, dtype=float)
     if not np.isfinite(matrix).all():
@@ -420,10 +446,18 @@ def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
 
 
 def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVerdict:
-    """Judge the stability of a periodic motion by its multipliers, shape (n,).
+    """Judge the stability of a periodic motion by its multipliers.
 
-    ``tolerance`` is the size of the margin up to which the verdict is "marginal"; it should not be less than the error of the
-    multipliers. Raises InputError if there are no multipliers, one is not finite, or the tolerance is negative or not finite.
+    Parameters
+    ----------
+    multipliers : array_like of complex, shape (n,)
+    tolerance : float
+        Size of the margin up to which the verdict is "marginal"; it should not be less than the error of the multipliers.
+
+    Raises
+    ------
+    InputError
+        If there are no multipliers, one is not finite, or the tolerance is negative or not finite.
     """
     values = np.atleast_1d(np.asarray(multipliers, dtype=complex))
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
@@ -450,9 +484,18 @@ def crossing(multiplier: complex) -> Crossing:
 def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
     """Return the determinant of the monodromy matrix by Liouville's formula: exp of the integral of the trace over the period.
 
-    ``trace``, shape (n,), is the trace of the Jacobian matrix at equal steps over one period, the end left out. It is
-    integrated by the trapezoidal rule, whose error comes only from harmonics of order n and more. ``period`` has the unit of
-    the independent variable, rad or s. Raises InputError if a value is not finite, or there is none.
+    Parameters
+    ----------
+    trace : array_like, shape (n,)
+        Trace of the Jacobian matrix at equal steps over one period, the end left out. It is integrated by the trapezoidal
+        rule, whose error comes only from harmonics of order n and more.
+    period : float
+        Period in the unit of the independent variable, rad or s.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, or there is none.
     """
     values = np.asarray(trace, dtype=float)
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
@@ -461,12 +504,20 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
 
 
 def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> NDArray[np.float64]:
-    """Return a smooth function of monodromy matrices (..., n, n) that is zero where a multiplier crosses the unit circle.
+    """Return a smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle.
 
-    Instead of a `Crossing`, the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function
-    is det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
-    negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of (mu_i mu_j - 1) over
-    all pairs of multipliers mu_i, mu_j; it is 1 if there is a single multiplier.
+    Parameters
+    ----------
+    monodromy : ndarray, shape (..., n, n)
+    crossing : Crossing or int
+        The crossing; the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function is
+        det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
+        negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of
+        (mu_i mu_j - 1) over all pairs of multipliers mu_i, mu_j; it is 1 if there is a single multiplier.
+
+    Returns
+    -------
+    ndarray, shape (...,)
     """
     if crossing is Crossing.TORUS:
         mu = multipliers(monodromy)

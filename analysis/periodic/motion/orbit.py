@@ -64,8 +64,6 @@ OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 class Turn:
     """One period of an orbit, sampled at equal steps of the crank angle; the end of the period is not a sample.
 
-    ``turn["slider.position"]`` is an output over the period, shape (n,).
-
     Attributes
     ----------
     angle : ndarray, shape (n,)
@@ -90,6 +88,10 @@ class Turn:
         Amplitudes of ``swings`` up to these sizes count as rounding errors.
     angles : frozenset of str
         Outputs that are angles.
+
+    Notes
+    -----
+    ``turn["slider.position"]`` is an output over the period, shape (n,).
     """
 
     angle: FloatArray
@@ -159,8 +161,12 @@ class Turn:
     def harmonic(self, name: str, order: float) -> float:
         """Return the amplitude of a harmonic of an output; ``order`` is the number of cycles per turn of the crank.
 
-        For a coordinate that goes round, the deviation from a uniform rotation is taken. Raises InputError if the period is not
-        a whole number of cycles of the harmonic, or there are too few samples for the harmonic.
+        For a coordinate that goes round, the deviation from a uniform rotation is taken.
+
+        Raises
+        ------
+        InputError
+            If the period is not a whole number of cycles of the harmonic, or there are too few samples for the harmonic.
         """
         number = order * self.turns
         if number != int(number) or not 0 < number < len(self.angle) / 2:
@@ -704,8 +710,15 @@ class OrbitEquations:
     The unknowns are the states y at the beginnings of the pieces of a period. The residual is y at the end of each piece minus
     y at the beginning of the next piece. Each evaluation also returns the `PeriodicOrbit`.
 
-    ``turns`` is the number of common periods, `Flow.period`, in a period of the motion; ``low`` and ``high`` are the range of
-    the family's parameter; for ``angles`` see `Stations`: by default the period is one piece.
+    Parameters
+    ----------
+    family : Family
+    turns : int
+        Number of common periods, `Flow.period`, in a period of the motion.
+    low, high : float
+        Range of the family's parameter.
+    angles : ndarray, shape (k + 1,), optional
+        As in `Stations`; by default the period is one piece.
     """
 
     def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:

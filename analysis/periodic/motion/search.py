@@ -58,7 +58,12 @@ _DISTURBANCE = 1e-3
 class Jump:
     """A jump of a sweep from one steady motion to another.
 
-    ``speed`` is the first speed on the new motion (rad/s); the amplitudes of the two motions are in m, or rad for an angle.
+    Attributes
+    ----------
+    speed : float
+        First speed on the new motion (rad/s).
+    amplitude_before, amplitude_after : float
+        Amplitudes of the two motions (m, or rad for an angle).
     """
 
     speed: float

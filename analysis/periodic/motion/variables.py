@@ -61,7 +61,10 @@ def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
 def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
     """Return the FMI name of the prescribed speed of the crank, such as ``drive.speed``; None if no speed can be prescribed.
 
-    Raises InputError if the mechanism has several cranks, and no drive tells which crank is meant.
+    Raises
+    ------
+    InputError
+        If the mechanism has several cranks, and no drive tells which crank is meant.
     """
     command = (find_crank(mechanism) if drive is None else drive.reference(mechanism)).command
     return None if command is None else mechanism.channels[command].name
@@ -70,8 +73,10 @@ def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
 def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
     """Return the FMI name of the parameter that varies if no name is given: the prescribed speed of the crank.
 
-    Raises InputError if the speed cannot be prescribed; or if the mechanism has several cranks, and no drive tells which crank
-    is meant.
+    Raises
+    ------
+    InputError
+        If the speed cannot be prescribed; or if the mechanism has several cranks, and no drive tells which crank is meant.
     """
     name = speed_name(mechanism, drive)
     if name is None:
@@ -83,8 +88,13 @@ def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
 def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """Check that the parameter ``name`` can vary in this drive.
 
-    Raises UnknownNameError if there is no parameter of that name; InputError if the parameter has no effect in this drive: a
-    speed under a torque, a torque at prescribed speed, a motor parameter without a motor.
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of that name.
+    InputError
+        If the parameter has no effect in this drive: a speed under a torque, a torque at prescribed speed, a motor parameter
+        without a motor.
     """
     require_drive(drive)
     mechanism = find_mechanism(parameters)
@@ -124,7 +134,13 @@ def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def parameter_unit(mechanism: Mechanism, name: str) -> str:
-    """Return the unit of a parameter of a mechanism or its drive by FMI name; UnknownNameError if there is none."""
+    """Return the unit of a parameter of a mechanism or its drive, by its FMI name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such parameter.
+    """
     names = variable_names(mechanism)
     if name not in names:
         raise unknown_name(name, names)
@@ -220,9 +236,20 @@ class NamedPlane:
 def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     """Return a function that gives the mechanism and drive for values of two parameters, with all others fixed.
 
-    ``x`` and ``y`` are names of parameters of mechanism or drive in the FMI contract, such as ``slider.damping``,
-    ``drive.speed`` or ``slider.force``; their values are in SI. Raises UnknownNameError if there is no parameter of that name;
-    InputError if the two parameters are the same or the speeds of two cranks, or if one of them has no effect in this drive.
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    x, y : str
+        Parameters of mechanism or drive by their names in the FMI contract, such as ``slider.damping``, ``drive.speed`` or
+        ``slider.force``; in SI.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of that name.
+    InputError
+        If the two parameters are the same or the speeds of two cranks, or if one of them has no effect in this drive.
     """
     if x == y:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")

@@ -76,9 +76,14 @@ class AvoidedRange:
 class FoldJump:
     """The jump of a machine at a fold at which its stable motion ends.
 
-    ``parameter`` is the value of the parameter at the fold, ``before`` the amplitude of the motion that ends. ``direction`` is
-    +1 if the motion exists below the fold and ends as the parameter rises, -1 if it ends as the parameter falls. ``after`` are
-    the amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
+    ``parameter`` is the value of the parameter at the fold, ``before`` the amplitude of the motion that ends.
+
+    Attributes
+    ----------
+    direction : int
+        +1 if the motion exists below the fold and ends as the parameter rises, -1 if the motion ends as the parameter falls.
+    after : tuple of float
+        Amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
     """
 
     parameter: float
@@ -361,9 +366,18 @@ _SAMPLED = 1e-6
 class Extremum:
     """A local maximum or minimum of the amplitude over the parameter of a family.
 
-    ``parameter`` is the value of the parameter at the extremum, such as the speed (rad/s), ``amplitude`` that of the coordinate
-    (m for a slider), and ``stability`` that of ``orbit``, the motion there. ``coordinate`` is the index of the free coordinate
-    in `PeriodicOrbit.swings`.
+    Attributes
+    ----------
+    parameter : float
+        Value of the parameter at the extremum, such as the speed (rad/s).
+    amplitude : float
+        Amplitude of the coordinate (m for a slider).
+    stability : Stability
+        Stability of the motion at the extremum.
+    orbit : PeriodicOrbit
+        The motion at the extremum.
+    coordinate : int
+        Index of the free coordinate in `PeriodicOrbit.swings`.
     """
 
     parameter: float
@@ -460,9 +474,20 @@ def special_gradient(
 ) -> PointGradient:
     """Compute how a special point of a branch, or an extremum of the amplitude, moves when other parameters change.
 
-    ``names`` are the FMI names of the other parameters; by default all, see `gradient_names`. Raises InputError if the
-    parameter of the family is not an FMI name but a function; LinkworkError if the value of the family's parameter at the point
-    has no derivative, for example where two folds meet.
+    Parameters
+    ----------
+    family : Family
+        A family over a parameter with an FMI name.
+    point : SpecialPoint or Extremum
+    names : sequence of str, optional
+        FMI names of the other parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    InputError
+        If the parameter of the family is not an FMI name but a function.
+    LinkworkError
+        If the value of the family's parameter at the point has no derivative, for example where two folds meet.
     """
     if not isinstance(family.vary, str):
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")

@@ -206,7 +206,7 @@ def follow(
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
-    """Follow the branch through an orbit to an end of the range of the parameter, or as far as possible: see `Branch.reason`.
+    """Follow the branch through an orbit to an end of the range of the parameter.
 
     Parameters
     ----------
@@ -227,6 +227,11 @@ def follow(
         Called with the parameter of every point.
     stop : callable, optional
         Called with the orbit of every point; the branch ends when ``stop`` returns true.
+
+    Returns
+    -------
+    Branch
+        The branch as far as it could be followed; ``reason`` says why it ended.
 
     Raises
     ------
@@ -252,9 +257,22 @@ def switch(
 ) -> Branch:
     """Follow the branch that begins at a period doubling, of twice the period, or at a branch point, of the same period.
 
-    ``side``, +1 or -1, is the direction in which the new branch is followed; a branch leaves a branch point in both directions.
-    The branch ends when its largest multiplier passes ``largest``. For the other arguments see `follow`. Raises InputError if
-    the point is neither a period doubling nor a branch point; ContinuationError if no point on the new branch is found.
+    Parameters
+    ----------
+    family, low, high, greatest, most_points, stop
+        See `follow`.
+    special : SpecialPoint
+    side : float
+        +1 or -1: direction in which the new branch is followed; a branch leaves a branch point in both directions.
+    largest : float
+        The branch ends when its largest multiplier passes this value.
+
+    Raises
+    ------
+    InputError
+        If the point is neither a period doubling nor a branch point.
+    ContinuationError
+        If no point on the new branch is found.
     """
     if special.kind not in _BEGINNINGS:
         raise InputError(

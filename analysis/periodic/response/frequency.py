@@ -79,8 +79,12 @@ def mean_effective_mass(parameters: Parameters) -> float:
     """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
 
     This degree of freedom is held where its spring exerts no force, or at 0 if `stiffness_name` finds no spring. For a five-bar
-    the result is the mean of m22. Raises AssemblyError if the links cannot be joined over the whole turn with this degree of
-    freedom held.
+    the result is the mean of m22.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined over the whole turn with this degree of freedom held.
     """
     mechanism = find_mechanism(parameters)
     cranks, freedom = motion.find_cranks(mechanism), first_freedom(mechanism)

@@ -35,8 +35,16 @@ from ..motion.variables import Family
 class SpecialPoint:
     """A point of a branch at which a multiplier crosses the unit circle.
 
-    ``parameter`` is the value of the branch's parameter at the point, ``orbit`` the motion there, and ``after`` the index of
-    the last point of the branch before the special point.
+    Attributes
+    ----------
+    kind : Crossing
+        FOLD, BRANCH_POINT, PERIOD_DOUBLING or TORUS.
+    parameter : float
+        Value of the branch's parameter.
+    orbit : PeriodicOrbit
+        The motion at the point.
+    after : int
+        Index of the last point of the branch before the special point.
     """
 
     kind: Crossing
@@ -156,7 +164,13 @@ def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.comple
 
 
 def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
-    """Compute the normal form at a special point of a branch; raise OrbitError if an integration over a period fails."""
+    """Compute the normal form at a special point of a branch.
+
+    Raises
+    ------
+    OrbitError
+        If the integration over a period, from a start next to the orbit, fails.
+    """
     forms = _forms(special.orbit)
     multiplier = special.kind.sign or torus_pair(special.orbit.multipliers)[0]
     if np.abs(special.orbit.multipliers - multiplier / abs(multiplier)).min() > _LOCATED:
@@ -281,8 +295,12 @@ class FormRun:
 def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
     """Run the mechanism near a special point, from a small deviation, on the side where the motion of the branch is unstable.
 
-    Raises InputError if the point is a fold: the branch has no motion beyond a fold; LinkworkError if the motion of the branch
-    is unstable on neither side, or only over a range too narrow for a run.
+    Raises
+    ------
+    InputError
+        If the point is a fold: the branch has no motion beyond a fold.
+    LinkworkError
+        If the motion of the branch is unstable on neither side, or only over a range too narrow for a run.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
@@ -391,10 +409,24 @@ def confirm(
 ) -> Confirmation:
     """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
 
-    ``turns`` is the number of turns of the run, or common periods of gears or several cranks, at least 20; by default 1000, and
-    up to 20000 if the margin is too small to distinguish growth from decay. ``start`` is a guess of the orbit, shape (n,).
-    Raises OrbitError if there is no periodic orbit; InputError if there are less than 20 turns; LinkworkError if the run ends
-    within the first turn.
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    turns : int, optional
+        Turns of the run, or common periods of gears or several cranks; at least 20. By default 1000, and up to 20000 if the
+        margin is too small to distinguish growth from decay.
+    start : array_like, shape (n,), optional
+        Guess of the orbit.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic orbit.
+    InputError
+        If there are less than 20 turns.
+    LinkworkError
+        If the run ends within the first turn.
     """
     if turns is not None and turns < 20:
         raise InputError(f"a run of {turns} turns: there must be at least 20 turns")

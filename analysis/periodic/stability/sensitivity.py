@@ -38,8 +38,6 @@ _DOUBLE = 1e-6
 class Gradient:
     """A quantity with its derivatives with respect to parameters.
 
-    ``gradient["slider.damping"]`` is one derivative.
-
     Attributes
     ----------
     value : float
@@ -50,6 +48,10 @@ class Gradient:
         Derivatives of the quantity with respect to the parameters, in SI units.
     at : ndarray, shape (m,)
         Values of the parameters.
+
+    Notes
+    -----
+    ``gradient["slider.damping"]`` is one derivative.
     """
 
     value: float
@@ -66,7 +68,10 @@ class Gradient:
     def elasticities(self) -> dict[str, float]:
         """Change of the quantity in percent for a change of each parameter by one percent; 0 for a parameter that is 0.
 
-        Raises InputError if the quantity is 0.
+        Raises
+        ------
+        InputError
+            If the quantity is 0.
         """
         if self.value == 0.0:
             raise InputError("a quantity that is 0 has no elasticities")
@@ -82,8 +87,16 @@ class Gradient:
 class PointGradient:
     """The derivatives, with respect to parameters, of a special point: a resonance, fold, period doubling or torus point.
 
-    ``along`` is the FMI name of the branch's parameter, such as ``drive.speed``. ``place`` is the gradient of this parameter's
-    value at the point with respect to the other parameters, ``amplitude`` that of the amplitude of ``orbit``, the motion there.
+    Attributes
+    ----------
+    along : str
+        FMI name of the branch's parameter, such as ``drive.speed``.
+    place : Gradient
+        Gradient of the value of the branch's parameter at the point, with respect to the other parameters.
+    amplitude : Gradient
+        Gradient of the amplitude of the motion at the point.
+    orbit : PeriodicOrbit
+        The motion at the point.
     """
 
     along: str
@@ -236,7 +249,10 @@ class MotionGradient:
     def multipliers(self) -> NDArray[np.complex128]:
         """Derivatives of the Floquet multipliers, in the order of `PeriodicOrbit.multipliers`, shape (n, m).
 
-        Raises LinkworkError if two multipliers coincide: then they have no derivatives.
+        Raises
+        ------
+        LinkworkError
+            If two multipliers coincide: then they have no derivatives.
         """
         scale, matrix = self.variations.scale, self.orbit.monodromy
         values, right = np.linalg.eig((matrix * scale / scale[:, None]).astype(complex))
@@ -267,9 +283,18 @@ class MotionGradient:
 def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
     """Compute the derivatives of a periodic motion with respect to parameters.
 
-    ``names`` are the FMI names of the parameters; by default all, see `gradient_names`. Raises UnknownNameError if a name is
-    not the name of a parameter; InputError if the parameter has no effect in this drive; LinkworkError if the variational
-    equations cannot be resolved.
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    names : sequence of str, optional
+        FMI names of the parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        If a name is not the name of a parameter, or the parameter has no effect in this drive.
+    LinkworkError
+        If the variational equations cannot be resolved.
 
     Examples
     --------
@@ -293,10 +318,23 @@ def extremum_gradient(
 ) -> PointGradient:
     """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
-    An extremum that is too near to a fold to be told from it moves with the fold. Newton's method begins from a motion near the
-    extremum of the amplitude of the free coordinate with the index ``coordinate``. ``along`` is the FMI name of the parameter,
-    such as ``drive.speed``; ``names`` are those of the other parameters, by default all, see `gradient_names`. Raises
-    LinkworkError if there is no extremum near the motion.
+    An extremum that is too near to a fold to be told from it moves with the fold.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion near the extremum, from which Newton's method begins.
+    along : str
+        FMI name of the parameter, such as ``drive.speed``.
+    names : sequence of str, optional
+        FMI names of the other parameters; by default all, see `gradient_names`.
+    coordinate : int
+        Index of the free coordinate whose amplitude has the extremum.
+
+    Raises
+    ------
+    LinkworkError
+        If there is no extremum near the motion.
     """
     others = _other_names(orbit, along, names)
     try:
@@ -315,9 +353,13 @@ def crossing_gradient(
 ) -> PointGradient:
     """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
-    For the arguments see `extremum_gradient`; ``kind`` is the kind of the point. Raises LinkworkError if there is no such point
-    near the motion, or its place has no derivative: the boundary is parallel to the parameter, two folds meet, or two branches
-    cross.
+    For the arguments see `extremum_gradient`; ``kind`` is the kind of the point.
+
+    Raises
+    ------
+    LinkworkError
+        If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
+        two folds meet, or two branches cross.
     """
     _require_derivative(kind)
     others = _other_names(orbit, along, names)
@@ -343,10 +385,24 @@ def _point_gradient(motion: MotionGradient, place: FloatArray, amplitude: float,
 def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
     """Compute the normal of the stability boundary in the space of parameters, at one of its points.
 
-    ``orbit`` is a motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`; ``names`` are the FMI
-    names of the parameters, such as the two axes of a chart. The result is the gradient of a function that is zero on the
-    boundary: for a period doubling or torus point `MotionGradient.test`; for a fold the shift of the map over a period along
-    the left eigenvector. Raises LinkworkError if the kind is a branch point.
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`.
+    kind : Crossing
+    names : sequence of str
+        FMI names of the parameters, such as the two axes of a chart.
+
+    Returns
+    -------
+    Gradient
+        Gradient of a function that is zero on the boundary: for a period doubling or torus point `MotionGradient.test`; for a
+        fold the shift of the map over a period along the left eigenvector.
+
+    Raises
+    ------
+    LinkworkError
+        If the kind is a branch point.
     """
     _require_derivative(kind)
     motion = MotionGradient(orbit, names)

@@ -238,8 +238,12 @@ class Variations:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of ``by_y`` and of ``by_constant`` along a direction.
 
-        ``direction`` has the components in the space of y at the nodes, shape (k, s, n); ``along`` those in the space of the
-        drive vector and the constants, shape (c,), zero if not given.
+        Parameters
+        ----------
+        direction : ndarray, shape (k, s, n)
+            Components of the direction in the space of y, at the nodes.
+        along : ndarray, shape (c,), optional
+            Components of the direction in the space of the drive vector and the constants; zero if not given.
         """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
@@ -309,7 +313,10 @@ class Variations:
     def periodic_solution(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the periodic solution of d' = A d + r: at the nodes, (k, s, n, m), and at crank angle 0, (n, m).
 
-        Raises LinkworkError if there is no such solution: exactly at a fold.
+        Raises
+        ------
+        LinkworkError
+            If there is no such solution: exactly at a fold.
         """
         starts = _solve_cyclic(self.steps, self._gains(forcing))
         return self._node_values(starts, forcing), starts[0]
