@@ -32,7 +32,10 @@ class MechanismError(LinkworkError):
 def check(mechanism: Mechanism) -> None:
     """Check that the parts of a mechanism are consistent.
 
-    Raises MechanismError if the parts are inconsistent; the message states the first fault.
+    Raises
+    ------
+    MechanismError
+        If the parts are inconsistent; the message states the first fault.
     """
     # later checks assume that earlier ones found no fault
     for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations, _faults_of_drawing):

@@ -178,9 +178,6 @@ class Dimension(_Shape):
 class Drawing:
     """Shapes on layers, in m with y upwards.
 
-    Raises InputError if there is no shape, all shapes are at one point, or the title is not one printable line;
-    UnknownNameError if the layer of a shape is not in ``layers``.
-
     Attributes
     ----------
     title : str
@@ -189,6 +186,13 @@ class Drawing:
         Layers by name, in the order in which they are drawn.
     lines, circles, polylines, dimensions, texts : tuple
         Shapes in any order; they are drawn by layer.
+
+    Raises
+    ------
+    InputError
+        If there is no shape, all shapes are at one point, or the title is not one printable line.
+    UnknownNameError
+        If the layer of a shape is not in ``layers``.
     """
 
     title: str
@@ -243,11 +247,25 @@ def _label(dimension: Dimension, metre: float) -> str:
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
-    """Return a drawing as the text of a DXF file (AutoCAD 2010, UTF-8) in a unit of `UNITS`.
+    """Write a drawing as DXF (AutoCAD 2010, UTF-8).
 
-    The variable $INSUNITS names the unit. The text has no date: times and identifiers in the header are 0.
+    Parameters
+    ----------
+    drawing : Drawing
+    unit : str
+        One of `UNITS`; the header names it ($INSUNITS).
 
-    Raises ParameterError if the unit is unknown; MissingLibraryError if ezdxf is not installed.
+    Returns
+    -------
+    str
+        The DXF text, without a date: times and identifiers in the header are 0.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is unknown.
+    MissingLibraryError
+        If ezdxf is not installed.
     """
     require("ezdxf")
     from ezdxf.filemanagement import new
@@ -312,12 +330,24 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
 
 
 def to_svg(drawing: Drawing, unit: str = "mm") -> str:
-    """Return a drawing as the text of an SVG file to scale 1:1, in a unit of `SVG_UNITS`, which is also the user unit.
+    """Write a drawing as SVG to scale 1:1, with ``width`` and ``height`` in the unit, which is also the user unit.
 
-    The text has a group for each layer that has shapes; its ``id`` is the layer's name. As SVG's y points down, a point (x, y)
-    is at (x, -y), and `analysis.files.read_points` reads the same points back.
+    Parameters
+    ----------
+    drawing : Drawing
+    unit : str
+        One of `SVG_UNITS`.
 
-    Raises ParameterError if SVG does not have the unit.
+    Returns
+    -------
+    str
+        The SVG text, with a group for each layer that has shapes; its ``id`` is the layer's name. As SVG's y points down, a
+        point (x, y) is at (x, -y), and `analysis.files.read_points` reads the same points back.
+
+    Raises
+    ------
+    ParameterError
+        If SVG does not have the unit.
     """
     svg = _Svg(drawing, _unit_length(unit, SVG_UNITS))
     number = svg.number
@@ -427,7 +457,12 @@ class _Svg:
 def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:
     """Write a drawing as DXF or SVG, according to the path's ending, and return the path.
 
-    Raises InputError if the path has another ending; ParameterError if the format does not have the unit.
+    Raises
+    ------
+    InputError
+        If the path has another ending.
+    ParameterError
+        If the format does not have the unit.
     """
     path = Path(path)
     text = to_dxf(drawing, unit) if check_ending(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)

@@ -33,7 +33,10 @@ class WritingError(LinkworkError, OSError):
 def limit(name: str, default: int) -> int:
     """Return a limit for input files: the environment variable ``LINKWORK_MAX_<name>`` if it is set, else ``default``.
 
-    Raises InputError if the variable is not a whole number above zero.
+    Raises
+    ------
+    InputError
+        If the variable is not a whole number above zero.
     """
     text = os.environ.get(f"LINKWORK_MAX_{name}", "").strip()
     if not text:
@@ -117,7 +120,10 @@ def check_plain(path: Path) -> None:
 def check_fmu(path: str | Path) -> None:
     """Check that an FMU can be unpacked safely: an archive of limited size that unpacks only into its own folder.
 
-    Raises InputError if the FMU cannot be unpacked; if a limit is exceeded, the message says how to raise it.
+    Raises
+    ------
+    InputError
+        If the FMU cannot be unpacked; if a limit is exceeded, the message says how to raise it.
     """
     path, most, members = Path(path), limit("FMU_MB", _FMU), limit("FMU_MEMBERS", _MEMBERS)
     try:

@@ -41,10 +41,16 @@ def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> U
 
 
 def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key: str = "") -> Any:
-    """Declare a field of a dataclass that `read` fills from a table by ``reader(value, name)``.
+    """Declare a field of a dataclass that `read` fills from a table.
 
-    ``default`` and ``factory`` are those of `dataclasses.field`; if neither is given, the table must have the entry. ``key`` is
-    the name of the entry in the table, if it differs from the name of the field.
+    Parameters
+    ----------
+    reader : callable
+        ``reader(value, name)``.
+    default, factory : optional
+        As in `dataclasses.field`; if neither is given, the table must have the entry.
+    key : str, optional
+        Name of the entry in the table, if it differs from the name of the field.
     """
     return field(default=default, default_factory=factory, metadata={"reader": reader, "key": key})
 
@@ -95,9 +101,6 @@ def read(
 ) -> Made:
     """Read a table: convert its values and pass them to ``kind``, which makes an object from them.
 
-    Raises UnknownNameError, MissingParameterError or ParameterError if the name of an entry is unknown, an entry is missing, or
-    a value is wrong.
-
     Parameters
     ----------
     kind : dataclass, function or dict
@@ -112,6 +115,11 @@ def read(
         Names of entries in the table by field, where they differ from the name of the field.
     base : dataclass instance, optional
         Gives the values of the fields that are not in the table.
+
+    Raises
+    ------
+    UnknownNameError, MissingParameterError, ParameterError
+        If the name of an entry is unknown, an entry is missing, or a value is wrong.
     """
     table = as_table(value, name)
     entries = _entries(kind, readers or {}, keys or {})
@@ -167,7 +175,19 @@ def as_table(value: Any, name: str) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Reader of a quantity: returns its value in SI; see `analysis.units.quantity`. The bounds are in SI, too."""
+    """Reader of a quantity: returns its value in SI; see `analysis.units.quantity`.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit of the quantity, which tells its dimension.
+    above, least, below : float, optional
+        Bounds in SI: greater than, not less than, less than.
+    bare : str, optional
+        Unit of numbers that are given without a unit; by default SI.
+    requirement : str, optional
+        End of the error message "it must ..."; by default it states the bounds, such as "be zero or greater".
+    """
 
     unit: str  # SI unit of the quantity, which tells its dimension
     above: float = -inf
@@ -232,7 +252,17 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """Reader of a list: returns a tuple of the converted items, which have numbered names, such as ``bar.holes[0]``."""
+    """Reader of a list: returns a tuple of the converted items.
+
+    Attributes
+    ----------
+    item : callable
+        Reader of each item; items have numbered names, such as ``bar.holes[0]``.
+    least, length : int, optional
+        Least number of items, and exact number of items.
+    single : bool
+        Whether a single item may be given without a list.
+    """
 
     item: Reader
     least: int = 0

@@ -25,7 +25,10 @@ _DEPTH, _TEXT, _NAME, _BITS = 50, 10_000, 200, 1024
 def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -> Path:
     """Write nested tables to a TOML or JSON file, according to the path's ending; ``head`` is a comment of a TOML file.
 
-    Raises InputError if the path ends neither in .toml nor in .json.
+    Raises
+    ------
+    InputError
+        If the path ends neither in .toml nor in .json.
     """
     path = Path(path)
     if check_ending(path, ENDINGS) == ".json":
@@ -40,7 +43,10 @@ def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -
 def read_tables(path: str | Path) -> dict[str, Any]:
     """Read nested tables from a TOML or JSON file.
 
-    Raises InputError if the file cannot be read, or does not have the format of its ending.
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not have the format of its ending.
     """
     path = Path(path)
     ending = check_ending(path, ENDINGS)
@@ -100,9 +106,18 @@ def _check_text(path: Path, name: str, text: str, longest: int) -> None:
 
 
 def override(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of nested tables with single values replaced, by dotted names of any number of parts: ``slider.stiffness``.
+    """Return a copy of nested tables with single values replaced.
 
-    Raises ParameterError if a part of a dotted name other than the last names an entry that is not a table.
+    Parameters
+    ----------
+    data : mapping
+    overrides : mapping
+        New values by dotted name, such as ``slider.stiffness``; the names may have any number of parts.
+
+    Raises
+    ------
+    ParameterError
+        If a part of a dotted name other than the last names an entry that is not a table.
     """
     result = dict(data)
     for name, value in overrides.items():

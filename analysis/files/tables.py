@@ -33,8 +33,12 @@ LARGE = 20_000_000
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
     """Write columns of equal length, by name, to a CSV file in full precision, and return its path.
 
-    Raises InputError if the columns differ in length, or the folder does not exist; Interrupted, and leaves no file, on
-    Ctrl-C.
+    Raises
+    ------
+    InputError
+        If the columns differ in length, or the folder does not exist.
+    Interrupted
+        If Ctrl-C was pressed; no file is left then.
     """
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     lengths = {name: len(values) for name, values in arrays.items()}
@@ -256,7 +260,10 @@ def heading_unit(heading: str) -> str:
 def read_rows(path: str | Path) -> list[dict[str, str]]:
     """Read the rows of a CSV file; each row is a dictionary of texts by the names in the header line.
 
-    Raises InputError if the file cannot be read.
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
     """
     path = Path(path)
     try:

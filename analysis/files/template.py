@@ -136,8 +136,16 @@ def entries(
 ) -> Iterator[str]:
     """Yield a TOML line for each entry of a table: the ``given`` entries, then all others as comments with their defaults.
 
-    ``kind`` is the dataclass into which the table is read, whose fields are the entries, or dict; ``readers``, by name, take
-    precedence over the readers of its fields. Unless they are ``active``, the given entries are comments as well.
+    Parameters
+    ----------
+    kind : dataclass, or dict with ``readers``
+        Class of the object into which the table is read; the fields of the class are the entries.
+    given : mapping
+        Values of the given entries by name.
+    readers : mapping, optional
+        Readers by name, instead of the readers of the dataclass.
+    active : bool
+        Whether the given entries are active; otherwise they are comments as well.
     """
     about: dict[str, str] = {}
     for base in reversed(kind.__mro__ if isinstance(kind, type) else ()):

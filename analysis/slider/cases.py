@@ -441,7 +441,10 @@ def read_slider_case(
 def linkage_from_csv(path: str | Path, rank: int = 1) -> syn.Linkage:
     """Read a linkage from a file of `Synthesis.to_csv`; ``rank`` 1 is the best linkage.
 
-    Raises InputError if the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
+    Raises
+    ------
+    InputError
+        If the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
     """
     rows = files.read_rows(path)
     if not 1 <= rank <= len(rows):

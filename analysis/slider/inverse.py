@@ -45,7 +45,12 @@ LEAST_SAMPLES = 16
 class TurnBalance:
     """Energy balance over one turn of a periodic motion (J): the work supplied equals the work dissipated.
 
-    Work is supplied by the slider force, the crank torque and the load at P, and dissipated by damper and guide friction.
+    Attributes
+    ----------
+    force, torque, load : float
+        Work of the slider force, of the crank torque, of the load at P.
+    dissipated : float
+        Work dissipated by damper and guide friction.
     """
 
     force: float
@@ -347,8 +352,6 @@ def best_spring(
     minimum is therefore a linear least-squares solution in the wedge k >= 0, low k <= k u0 <= high k: inside the wedge or
     on one of the two edges.
 
-    Raises InputError or AssemblyError as `inverse_dynamics` does; InputError also if the bounds are not finite and in order.
-
     Parameters
     ----------
     free_position : (float, float), optional
@@ -356,6 +359,11 @@ def best_spring(
         an arbitrarily soft spring with a far free position replaces any constant force.
     parameters, slider, crank_speed, load, samples
         As for `inverse_dynamics`; a spring in the parameters is ignored.
+
+    Raises
+    ------
+    InputError, AssemblyError
+        As for `inverse_dynamics`; also if the bounds are not finite and in order.
     """
     low, high = free_position or (-parameters.ground_length, parameters.ground_length)
     if not (-inf < low <= high < inf):

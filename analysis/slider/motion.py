@@ -35,9 +35,7 @@ def slider_motion(
     guesses: Sequence[syn.Linkage | syn.Solution] = (),
     search: syn.Search = syn.USUAL_SEARCH,
 ) -> syn.Synthesis:
-    """Find the motion of the rocker pivot that minimises the error of a linkage in a task: linkages with a moving pivot.
-
-    Raises InputError, InfeasibleError or SynthesisInterrupted as `synthesize` does.
+    """Find the motion of the rocker pivot that minimises the error of a linkage in a task.
 
     Parameters
     ----------
@@ -56,6 +54,16 @@ def slider_motion(
         Further starts of the search: the motion of their rocker pivots and the dimensions named in ``bounds`` are used.
     search : Search
         Settings of the search, which starts from random harmonics and guide angles, without a scan.
+
+    Returns
+    -------
+    Synthesis
+        Solutions: linkages with a moving rocker pivot.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted
+        As for `synthesize`.
 
     Examples
     --------
@@ -108,7 +116,10 @@ def greatest_derivative(linkage: syn.Linkage, order: int) -> float:
 def motion_of_plant(linkage: syn.Linkage) -> FourierSeries:
     """Return the slider position (m) as a Fourier series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
 
-    Raises InputError if the rocker pivot is on a second crank.
+    Raises
+    ------
+    InputError
+        If the rocker pivot is on a second crank.
     """
     if linkage.pivot is None:
         return FourierSeries.constant(0.0)

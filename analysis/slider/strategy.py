@@ -125,6 +125,10 @@ def simplest_mechanism(
     search : Search
         Settings of the search for each mechanism; the four-bar has twice as many starts.
 
+    Returns
+    -------
+    Strategy
+
     Raises
     ------
     InputError

@@ -35,8 +35,6 @@ from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at_an
 class TrackingController:
     """Controller with feed-forward by inverse dynamics on a model, feedback by a design, or both.
 
-    Raises InputError if there is neither feed-forward nor feedback, or an argument is invalid.
-
     Parameters
     ----------
     parameters : FiveBarParameters
@@ -53,6 +51,11 @@ class TrackingController:
         Load at P (N) that the feed-forward takes into account.
     limit : float
         Largest magnitude of the force (N).
+
+    Raises
+    ------
+    InputError
+        If there is neither feed-forward nor feedback, or an argument is invalid.
     """
 
     channel = "slider.force"
@@ -167,7 +170,10 @@ class TrackingResult:
     def metrics(self) -> TrackingMetrics:
         """Compute tracking errors, force and power over the last turn.
 
-        Raises InputError if the run ended early, or is shorter than a turn.
+        Raises
+        ------
+        InputError
+            If the run ended early, or is shorter than a turn.
         """
         turn, length = 2.0 * pi / abs(self.crank_speed), float(self.loop.time[-1])
         last = self.loop.end(turn)
@@ -202,9 +208,6 @@ def track(
 ) -> TrackingResult:
     """Run the full nonlinear plant under a tracking controller, in process or as its FMU.
 
-    Raises InputError if an argument is invalid; AssemblyError if the links of the model cannot be joined somewhere on the
-    reference, or those of the plant at the start.
-
     Parameters
     ----------
     controller : TrackingController
@@ -230,6 +233,13 @@ def track(
     -------
     TrackingResult
         If the plant reaches the limit of assembly, the run ends there, with a status, a message and all data up to that time.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid.
+    AssemblyError
+        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
     """
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:

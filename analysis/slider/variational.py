@@ -107,7 +107,10 @@ class VariationalMotion:
     def to_series(self, order: int) -> FourierSeries:
         """Fit a Fourier series in the crank rotation to u by weighted least squares, as a start for a direct search.
 
-        Raises InputError if there are too few rotations for the order.
+        Raises
+        ------
+        InputError
+            If there are too few rotations for the order.
         """
         if order < 0 or 2 * order + 1 > len(self.u):
             raise InputError(

@@ -340,14 +340,18 @@ class SynthesisCase:
 def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SynthesisCase:
     """Read a synthesis from a TOML or JSON file; see `docs/synthesis-cases.md`.
 
-    Raises InputError or ParameterError if the file cannot be read, or an entry is not usable; InfeasibleError if bounds and
-    constraints contradict one another.
-
     Parameters
     ----------
     path : path
     overrides : mapping, optional
         Values by dotted name that replace the file's, such as ``constraints.largest_link`` or ``search.seed``.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If the file cannot be read, or an entry is not usable.
+    InfeasibleError
+        If bounds and constraints contradict one another.
     """
     path = Path(path)
     return read_synthesis_case(files.read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)

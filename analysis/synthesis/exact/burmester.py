@@ -50,8 +50,12 @@ LONGEST = 5.0
 class Dyad:
     """A link that turns about a fixed pivot and guides a point of a body.
 
-    ``pivot`` is its fixed end, a point of the centre-point curve; ``point`` is its other end with the body in the first pose, a
-    point of the circle-point curve (m).
+    Attributes
+    ----------
+    pivot : complex
+        The link's fixed end (m): a point of the centre-point curve.
+    point : complex
+        The link's other end with the body in the first pose (m): a point of the circle-point curve.
     """
 
     pivot: complex

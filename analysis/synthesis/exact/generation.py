@@ -56,7 +56,14 @@ ON_CIRCLE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Generators(Exact):
-    """All four-bars that generate a function exactly at its points: sound linkages first, then by transmission angle."""
+    """All four-bars that generate a function exactly at its points.
+
+    Attributes
+    ----------
+    task : RockerFunction
+    solutions : tuple of Solution
+        Sound linkages first, then by transmission angle.
+    """
 
     task: RockerFunction
     solutions: tuple[Solution, ...]
@@ -82,8 +89,6 @@ _DEPENDENT_POINTS = (
 def function_generators(task: RockerFunction, *, crank_phase: Amount | None = None) -> Generators:
     """Find all four-bars whose rocker passes exactly through the given angles.
 
-    Raises InputError if there are more or fewer points than unknowns, or the points leave infinitely many linkages.
-
     Parameters
     ----------
     task : RockerFunction
@@ -91,6 +96,11 @@ def function_generators(task: RockerFunction, *, crank_phase: Amount | None = No
         given, and the mounting angle if it is free (``mounting``).
     crank_phase : float, optional
         th20 (rad); unknown by default.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer points than unknowns, or the points leave infinitely many linkages.
 
     Examples
     --------
@@ -223,9 +233,6 @@ BETWEEN = 90
 def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Linkage, Linkage]:
     """Compute the Roberts-Chebyshev cognates of a four-bar.
 
-    Raises ParameterError if the linkage is not a four-bar with a fixed rocker pivot, or the coupler point is B or C;
-    AssemblyError if the links cannot be joined at ``rotation``.
-
     Parameters
     ----------
     linkage : Linkage
@@ -239,6 +246,13 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     tuple of Linkage
         Three four-bars with the same coupler curve; G is the third fixed pivot. The first has the pivots G and D and its crank
         at G. The second has the pivots A and G and its crank at A. The third is the second with its crank at G.
+
+    Raises
+    ------
+    ParameterError
+        If the linkage is not a four-bar with a fixed rocker pivot, or the coupler point is B or C.
+    AssemblyError
+        If the links cannot be joined at ``rotation``.
 
     Examples
     --------
@@ -267,13 +281,19 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     If the task gives crank rotations, only the cognate with the same crank rotations is returned. For a closed path
     only cognates whose cranks can turn fully are returned.
 
-    Raises InputError if the task is not a path: the coupler of a cognate has other angles than the coupler of the original;
-    ParameterError as `cognates` does; AssemblyError if the links cannot be joined at the first target.
-
     Returns
     -------
     tuple of Solution
         Sound linkages first.
+
+    Raises
+    ------
+    InputError
+        If the task is not a path: the coupler of a cognate has other angles than the coupler of the original.
+    ParameterError
+        As `cognates`.
+    AssemblyError
+        If the links cannot be joined at the first target.
     """
     task, linkage, rotation = solution.task, solution.linkage, solution.rotation
     if not _is_path(task):

@@ -61,14 +61,17 @@ TEETH = 6
 class SliderMotion:
     """Motion of the rocker pivot D along a guide: a Fourier series of the crank's rotation phi.
 
-    Raises ParameterError if the guide's angle is not finite.
-
     Attributes
     ----------
     series : FourierSeries
         Position u(phi) on the guide from the end E of the ground link (m); its order is the number of harmonics.
     guide_angle : float
         alpha, the guide's direction from the ground link (rad).
+
+    Raises
+    ------
+    ParameterError
+        If the guide's angle is not finite.
     """
 
     series: FourierSeries
@@ -115,9 +118,6 @@ class SecondCrank:
     D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio.
     The input shaft, with the rotation phi, turns once per period of the linkage, in which the first crank turns k times.
 
-    Raises ParameterError if the length is not greater than zero, the ratio is not a quotient as above, or the phase is not
-    finite.
-
     Attributes
     ----------
     length : float
@@ -128,6 +128,11 @@ class SecondCrank:
         psi at phi = 0, without the series (rad).
     series : FourierSeries
         Rotation that is added to the rotation by the gears, a function of phi (rad); zero if gears alone turn the crank.
+
+    Raises
+    ------
+    ParameterError
+        If the length is not greater than zero, the ratio is not a quotient as above, or the phase is not finite.
     """
 
     length: float
@@ -160,9 +165,6 @@ class Linkage:
 
     Lengths in m, angles in rad.
 
-    Raises ParameterError if a value is not finite, a link is not longer than zero, the branch is not +1 or -1, or the pivot has
-    a wrong type.
-
     Attributes
     ----------
     pivot_x, pivot_y : float
@@ -181,6 +183,11 @@ class Linkage:
         Assembly: +1 with C to the left of B -> D, -1 to the right.
     pivot : SliderMotion, optional
         Motion of the rocker pivot; None for a fixed pivot.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite, a link is not longer than zero, the branch is not +1 or -1, or the pivot has a wrong type.
     """
 
     kind: ClassVar[Kind] = "four-bar"
@@ -591,7 +598,10 @@ class SliderCrank(Linkage):
 class FiveBar(Linkage):
     """A five-bar with two cranks: a four-bar whose rocker pivot D is on a second crank about the end E of the ground link.
 
-    ``pivot`` is the motion of the second crank: geared to the first crank, or independent.
+    Attributes
+    ----------
+    pivot : SecondCrank
+        Motion of the second crank: geared to the first crank, or independent.
     """
 
     kind: ClassVar[Kind] = "geared-five-bar"

@@ -252,9 +252,16 @@ class MachineSpec:
     def plant_values(self, d: Any, straight: bool, sliding: bool, law: Callable[..., dict[str, Any]]) -> dict[str, Any]:
         """Return the parameters of the five-bar plant for a linkage, by name, without the parameters of its slider.
 
-        ``d`` has dimensions and branch by their names in `Linkage`, as numbers or CasADi symbols, for which ``law`` is
-        `link_mass_properties`. ``straight`` says whether the coupler point is on the line of B and C, ``sliding`` whether the
-        linkage is a slider-crank; see `sliding_five_bar`.
+        Parameters
+        ----------
+        d : namespace
+            Dimensions and branch, by their names in `Linkage`: numbers or CasADi symbols.
+        straight : bool
+            Whether the coupler point is on the line of B and C.
+        sliding : bool
+            Whether the linkage is a slider-crank; see `sliding_five_bar`.
+        law : callable
+            `link_mass_properties`, for numbers or symbols.
         """
         links, far = {name: getattr(d, name) for name in LINKS}, FAR * d.coupler_length
         if sliding:
@@ -368,8 +375,6 @@ class PinForces:
 def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None) -> PinForces:
     """Compute the forces on the pins of a linkage at constant crank speed, from the equations of the five-bar plant.
 
-    Raises ParameterError if the rocker pivot moves; AssemblyError if the links cannot be joined at some crank rotation.
-
     Parameters
     ----------
     linkage : Linkage
@@ -377,6 +382,13 @@ def pin_forces(linkage: Linkage, make: MachineSpec, rotation: tuple[float, float
     make : MachineSpec
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.
+
+    Raises
+    ------
+    ParameterError
+        If the rocker pivot moves.
+    AssemblyError
+        If the links cannot be joined at some crank rotation.
     """
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: for a moving pivot use slider.inverse_dynamics")

@@ -208,10 +208,19 @@ PIN, LETTER = 0.008, 0.022
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
     """Draw a linkage: links with their lengths, pins, guide, coupler curve and target, in coordinates of the plane (m).
 
-    The crank is at ``rotation`` (rad), by default the first rotation of the task, or else of a turn, at which the links can be
-    joined. ``poses`` is the number of further positions, in thin lines, at equal steps over the task.
+    Parameters
+    ----------
+    solution : Solution
+    rotation : float, optional
+        Crank rotation (rad); by default the first rotation of the task, or else of a turn, at which the links can be joined.
+    poses : int
+        Number of further positions, in thin lines, at equal steps over the task.
+    title : str
 
-    Raises AssemblyError if the links cannot be joined at ``rotation``, or at any rotation.
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined at ``rotation``, or at any rotation.
     """
     scene = LinkageScene(solution, title)
     tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
@@ -376,10 +385,21 @@ def crowded_plates(solution: Solution, pin: float) -> tuple[str, ...]:
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
     """Draw the links as plates with round ends and holes for the pins, one below the other, with dimensions.
 
-    ``width`` and ``thickness`` are those of each plate, ``pin`` is the diameter of the holes (m). The ground link is drawn if
-    both its ends are pivots; the guide of a slider is not drawn. The coupler includes the coupler point if the task has one.
+    The ground link is drawn if both its ends are pivots; the guide of a slider is not drawn. The coupler includes the coupler
+    point if the task has one.
 
-    Raises ParameterError if the holes are not narrower than the plates, or a size is not greater than zero.
+    Parameters
+    ----------
+    width, thickness : float
+        Width and thickness of each plate (m).
+    pin : float
+        Diameter of the holes (m), less than the width.
+    title : str
+
+    Raises
+    ------
+    ParameterError
+        If the holes are not narrower than the plates, or a size is not greater than zero.
     """
     for name, value in (("width", width), ("thickness", thickness), ("pin", pin)):
         if not (isfinite(value) and value > 0.0):

@@ -143,9 +143,17 @@ def displacements(solution: Solution) -> dict[str, float]:
 
 
 def round_dimensions(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
-    """Round lengths and angles to whole steps (m, rad), and compute the increase of the error.
+    """Round lengths and angles to whole steps, and compute the increase of the error.
 
-    The default steps are `length_step` and 0.1 degrees. Raises InputError if a step is not above zero.
+    Parameters
+    ----------
+    length, angle : float
+        Steps (m, rad); `length_step` and 0.1 degrees by default.
+
+    Raises
+    ------
+    InputError
+        If a step is not above zero.
     """
     length = length_step(solution.linkage) if length is None else length
     for what, step in (("length", length), ("angle", angle)):
@@ -208,10 +216,19 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """Compute how much an error of one step in the worse direction increases the quality function, for each dimension by name.
+    """Compute, for each dimension, how much an error of one step in the worse direction increases the quality function.
 
-    The steps are ``length`` (m) and ``angle`` (rad); guide angle and Fourier coefficients of a motion are left out. The changed
-    linkages are evaluated, so that steps may have any size. The increase is infinite if the links cannot be joined.
+    The changed linkages are evaluated, so that steps may have any size. The increase is infinite if the links cannot be joined.
+
+    Parameters
+    ----------
+    length, angle : float
+        Steps (m, rad).
+
+    Returns
+    -------
+    dict
+        Increase of the quality function by name of the dimension, without guide angle and Fourier coefficients of a motion.
     """
     linkage, grown = solution.linkage, {}
     for name, value in _manufactured_dimensions(linkage).items():

@@ -90,14 +90,17 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
 
     The errors do not depend on the sampling of a search: for an untimed path the coupler curve is a polygon of `CURVE` points.
 
-    Raises InputError if rotations are needed and not given.
-
     Parameters
     ----------
     task : Task
     linkage : Linkage
     rotation : ndarray, optional
         Crank rotations (rad) of an untimed task's stations; required except for closed paths.
+
+    Raises
+    ------
+    InputError
+        If rotations are needed and not given.
     """
     if isinstance(task, UntimedPath):
         return _evaluate_path(task, linkage, rotation)

@@ -397,13 +397,22 @@ class Program(Statement):
         places: Sequence[FloatArray] | None = None,
         small: bool = False,
     ) -> Answer:
-        """Solve the program from a start, within a limit of iterations.
+        """Solve the program from a start.
 
-        ``size`` is the magnitude of the greatest error (units) or of the greatest value, if the program minimises one of these.
-        ``pieces`` has the index of the triangle of each region in which the pivot must lie, by default the nearest. ``places``
-        are the crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed; without them the bounds
-        are imposed on a grid, with a margin that guarantees the bounds everywhere. With ``small`` the steps are small from the
-        beginning.
+        Parameters
+        ----------
+        start : Start
+        size : float
+            Magnitude of the greatest error (units) or of the greatest value, if the program minimises one of these.
+        iterations : int
+            Limit of iterations.
+        pieces : sequence of int, optional
+            Index of the triangle of each region in which the pivot must lie; by default the nearest.
+        places : sequence of ndarray, optional
+            Crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed. Without these rotations the
+            bounds are imposed on a grid, with a margin that guarantees the bounds everywhere.
+        small : bool
+            Whether the steps are small from the beginning.
         """
         z0, parameters = self.unknowns_and_parameters(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.evaluate(z0, parameters)):

@@ -373,8 +373,6 @@ def improve(
 
     The optimisation starts from ``search.starts`` random motions of the pivot, and from guesses.
 
-    Raises InputError, InfeasibleError or SynthesisInterrupted as `synthesize` does.
-
     Parameters
     ----------
     task, bounds, constraints, guesses, search
@@ -386,6 +384,11 @@ def improve(
         Unknown motion of the rocker pivot.
     kept : collection of str
         Dimensions that are fixed and returned unchanged.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted
+        See `synthesize`.
     """
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
@@ -575,14 +578,10 @@ def trade_off(
     problem. A solution of a tighter limit also meets the next looser limit: a second pass in the opposite direction uses such a
     solution for the looser limit as well, unchanged or optimised again. Thus the error can only grow as the limit is tightened.
 
-    Raises InputError if ``over`` or the limits are not usable; TradeOffInterrupted on Ctrl-C, with the best solution so far at
-    each limit.
-
     Parameters
     ----------
     task : Task
     over : "size", "transmission" or "pin-force"
-        What is limited besides the error.
     limits : array_like, shape (n,)
         Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
     bounds, constraints, kinds, gears
@@ -590,6 +589,13 @@ def trade_off(
         constraints gives masses, load and speed.
     search : Search
         See `synthesize`; but there are at most 16384 candidates, and ``solutions`` is ignored.
+
+    Raises
+    ------
+    InputError
+        If ``over`` or the limits are not usable.
+    TradeOffInterrupted
+        On Ctrl-C, with the best solution so far at each limit.
     """
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
@@ -626,8 +632,13 @@ def solve_both_ways(
 ) -> tuple[dict[int, Solution], int | None]:
     """Solve a series of problems, from the loosest to the tightest and back, each starting from the previous solutions.
 
-    ``order`` has the indices of the problems, the loosest first. ``search`` is a function of the index of a problem, the
-    guesses, and whether the pass goes back; it returns solutions or raises `InfeasibleError`.
+    Parameters
+    ----------
+    order : sequence of int
+        Indices of the problems, the loosest first.
+    search : callable
+        Function of the index of a problem, the guesses, and whether the pass goes back from the tightest problem to the
+        loosest; it returns solutions or raises `InfeasibleError`.
 
     Returns
     -------

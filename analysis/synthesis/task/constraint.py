@@ -315,7 +315,12 @@ class Demand:
 class TimeRatio(Demand):
     """Constraint: the four-bar is a crank-rocker whose slow swing lasts ``least`` to ``greatest`` times the quick swing.
 
-    For a slider-crank the constraint bounds the same ratio of the slider's two strokes, which is at least 1.
+    For a slider-crank the constraint bounds the same ratio of the slider's two strokes.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds of the time ratio, which is at least 1.
     """
 
     grashof: ClassVar[GrashofType | None] = "crank-rocker"
@@ -355,7 +360,13 @@ def swing_advance(d: Any) -> Any:
 @in_si(least="m", greatest="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke(Demand):
-    """Constraint: the crank of a slider-crank turns fully, and its slider has a stroke from ``least`` to ``greatest`` (m)."""
+    """Constraint: the crank of a slider-crank turns fully, and the stroke of its slider is within bounds.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds of the stroke (m).
+    """
 
     turns: ClassVar[bool] = True
 
@@ -653,7 +664,13 @@ class Toggle(_LimitPosition):
 @in_si(between="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoToggle(Demand):
-    """Constraint: no toggle ``between`` two crank rotations, counted as in the task (rad), and the links stay joined."""
+    """Constraint: there is no toggle between two crank rotations, and the links stay joined.
+
+    Attributes
+    ----------
+    between : (float, float)
+        Crank rotations, counted as in the task (rad).
+    """
 
     between: tuple[Amount, Amount]
 

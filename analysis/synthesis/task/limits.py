@@ -118,7 +118,32 @@ PivotUnknown = SliderUnknown | CrankUnknown
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """Bounds and constraints in normal form: lengths in units of the target's size, coordinates relative to its centre."""
+    """Bounds and constraints in normal form: lengths in units of the target's size, coordinates relative to its centre.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (11,)
+        Bounds of `UNKNOWNS`.
+    turn, way : float or None
+        Least transmission angles (rad): ``turn`` over a full turn of the crank, ``way`` during the task. A ``turn`` of 0 only
+        requires that the crank turns fully, a ``way`` of 0 that the links stay joined. None requires nothing.
+    grashof : str or None
+        Required Grashof type.
+    branches : tuple of int
+        Assemblies that are tried.
+    regions : tuple
+        For each region the pivot, "A" or "D", and the triangles, each shape (3, 2), in units.
+    requires : tuple of Require
+        Functions that must be at most zero, or equal to zero.
+    linkage : type
+        Type of the linkages.
+    second : (float, float), optional
+        Bounds of the second crank's length of a geared five-bar, in units.
+    ratio : float
+        Gear ratio of a geared five-bar.
+    least : MinimisedFunction, optional
+        The function that is minimised instead of an error.
+    """
 
     low: FloatArray  # least values of `UNKNOWNS`, shape (11,)
     high: FloatArray  # greatest values of `UNKNOWNS`, shape (11,)

@@ -106,15 +106,18 @@ def even_odd_area(*rings: FloatArray) -> float:
 class TargetPath:
     """A plane curve to be traced, in the order of the points.
 
-    Raises InputError if there are fewer than 3 points (2 if open), a point is not finite, two successive points or all are the
-    same, the shape is not (n, 2), or a closed curve encloses no area.
-
     Attributes
     ----------
     points : ndarray, shape (n, 2)
         Points in order (m); a closed curve does not repeat its first point at the end.
     closed : bool
         Whether the last point is joined to the first.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than 3 points (2 if open), a point is not finite, two successive points or all are the same, the
+        shape is not (n, 2), or a closed curve encloses no area.
     """
 
     points: FloatArray
@@ -205,9 +208,6 @@ class TargetPath:
         Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that a rotation of the curve rotates the
         result.
 
-        Raises InputError if the curve has fewer than 6 points, or the deviation is not between zero and the deviation of the
-        smoothest possible curve (a point if closed, a straight line if open).
-
         Parameters
         ----------
         n : int
@@ -216,6 +216,12 @@ class TargetPath:
             Root mean square distance of the points from the spline (m), if the noise is known. By default lambda is chosen by
             generalised cross-validation, which assumes that the noise is not correlated from point to point; for a slow tremor
             of the hand give the deviation.
+
+        Raises
+        ------
+        InputError
+            If the curve has fewer than 6 points, or the deviation is not between zero and the deviation of the smoothest
+            possible curve (a point if closed, a straight line if open).
         """
         from scipy.interpolate import CubicSpline
         from scipy.optimize import brentq, minimize_scalar
@@ -290,11 +296,21 @@ PIECES = 2000
 
 
 def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
-    """Compute the distance of each of m points, shape (m, 2), from a curve of straight segments, exactly (m), shape (m,).
+    """Compute the distance of each point from a curve of straight segments, exactly (m), shape (m,).
 
-    ``curve`` has the vertices of the curve, shape (n, 2) in m; if ``closed``, its last point is joined to its first.
+    Parameters
+    ----------
+    curve : array_like, shape (n, 2)
+        Vertices of the curve (m).
+    points : array_like, shape (m, 2)
+        Points whose distances are computed (m).
+    closed : bool
+        Whether the curve's last point is joined to its first.
 
-    Raises InputError if the curve has fewer than 2 points, or a coordinate is not finite.
+    Raises
+    ------
+    InputError
+        If the curve has fewer than 2 points, or a coordinate is not finite.
     """
     from ...numerics.overlap import find_nearest
 
@@ -329,8 +345,6 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
 
     The integrals are sums over `PIECES` pieces of equal length by the midpoint rule, with an error of about 1e-6 of the value.
 
-    Raises InputError if the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
-
     Parameters
     ----------
     curve : array_like, shape (n, 2)
@@ -338,6 +352,11 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
     target : TargetPath
     closed : bool
         Whether the curve's last point is joined to its first.
+
+    Raises
+    ------
+    InputError
+        If the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
     """
     points = plane_points(curve, "points of the curve", 3 if closed else 2)
     if closed and target.closed:
@@ -353,9 +372,19 @@ def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
-    Arguments and errors are those of `area_difference`, and for an open target and a closed curve only the target's points
-    count, too. Distances are computed at the vertices and at `PIECES` points at equal arc lengths. The result is below the true
-    distance by at most half the spacing of these points.
+    For an open target and a closed curve only the target's points count, as in `area_difference`. Distances are computed at the
+    vertices and at `PIECES` points at equal arc lengths. The result is below the true distance by at most half the spacing of
+    these points.
+
+    Parameters
+    ----------
+    curve, target, closed
+        As for `area_difference`.
+
+    Raises
+    ------
+    InputError
+        As for `area_difference`.
     """
     points = plane_points(curve, "points of the curve", 3 if closed else 2)
     seen = np.vstack([target.points, _cut_into_pieces(closed_vertices(target.points, target.closed))[0]])
@@ -517,8 +546,6 @@ def path_from_formula(
 ) -> TargetPath:
     """Compute a curve from two formulas, at n equal steps of their parameter.
 
-    Raises InputError if a formula, the range or the curve is not usable; ParameterError if the unit is not a unit of length.
-
     Parameters
     ----------
     x, y : str
@@ -530,6 +557,13 @@ def path_from_formula(
     start, end : float or str
         Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve ends at its first point (to within
         1e-9 of its extent), it is closed, and that point is not repeated.
+
+    Raises
+    ------
+    InputError
+        If a formula, the range or the curve is not usable.
+    ParameterError
+        If the unit is not a unit of length.
     """
     factor = quantity(f"1 {unit}", "m", "unit")
     functions = [formula(text) for text in (x, y)]
@@ -554,8 +588,6 @@ def function_from_formula(
 ) -> tuple[FloatArray, FloatArray]:
     """Compute angles at n equal steps of the crank angle from a formula such as ``"70 + 100*abs(sin(t/2))"``.
 
-    Raises InputError if the formula or the range is not usable; ParameterError if the unit is not a unit of angle.
-
     Parameters
     ----------
     text : str
@@ -573,6 +605,13 @@ def function_from_formula(
     -------
     crank_angle, angle : ndarray, shape (n,)
         Crank angles and angles of the formula (rad).
+
+    Raises
+    ------
+    InputError
+        If the formula or the range is not usable.
+    ParameterError
+        If the unit is not a unit of angle.
     """
     factor = quantity(f"1 {unit}", "rad", "unit")
     if spacing == "chebyshev":
