@@ -86,8 +86,8 @@ def stored_rows(mechanism: Mechanism) -> list[list[float]]:
 def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
     """Return the rows of the table for the default experiment of a mechanism, computed by the plant in plain Python.
 
-    A tolerance has no row if the run with this tolerance ends early. ``reference`` are the reference results as CSV, with a
-    heading: the time, and all outputs except residuals.
+    A tolerance has no row if the run with this tolerance ends early. ``reference`` is the text of the reference results as
+    CSV: a heading, and columns with the time and all outputs except residuals.
     """
     heading, *lines = csv.reader(reference.splitlines())
     right = np.array(lines, dtype=float)

@@ -19,10 +19,18 @@ _MAKERS = {"python": ("pythonfmu", "ziglang", "fmpy"), "native": ("casadi", "zig
 
 
 def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int) -> dict[str, bytes]:
-    """Add the bill of materials to the files of an FMU; return all files by path, like ``entries``.
+    """Add the bill of materials to the files of an FMU; return all files by path.
 
-    ``name`` is that of the FMU's file, without its ending, and ``fmi`` the major version of FMI. The FMU is ``native``, or else
-    a Python FMU.
+    Parameters
+    ----------
+    name : str
+        Name of the FMU's file, without its ending.
+    entries : mapping
+        Content of the files by path in the archive.
+    native : bool
+        Whether the FMU is native; else it is a Python FMU.
+    fmi : int
+        Major version of FMI.
     """
     files = {place: hashlib.sha256(content).hexdigest() for place, content in sorted(entries.items())}
     made = [_component("linkwork", linkwork.__version__, "MIT", index="")]

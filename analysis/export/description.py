@@ -115,8 +115,9 @@ def token(mechanism: Mechanism, kind: Kind) -> str:
 def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
     """Return ``modelDescription.xml`` of an FMU.
 
-    The same mechanism gives the same bytes; the date of generation is written only if ``SOURCE_DATE_EPOCH`` sets it. FMI 2.0
-    lists the files to compile here, by their paths below ``sources/`` of the archive, FMI 3.0 in `build_description`.
+    The same mechanism gives the same bytes; the date of generation is written only if ``SOURCE_DATE_EPOCH`` sets it.
+    ``sources`` are the files to compile, by their paths below ``sources/`` of the archive; FMI 2.0 lists them here, FMI 3.0 in
+    `build_description`.
     """
     entries = _entries(mechanism, kind)
     root = Element(

@@ -227,10 +227,15 @@ def compile_library(
 
     Parameters
     ----------
+    folder : path
     files : sequence of str
         Paths of the C files, in the folder or elsewhere.
+    library : str
+        Name of the library.
     target : str
         Platform by its name in Zig.
+    options : sequence of str
+        Options of the compiler.
     kept : bool
         Whether the library is kept in the cache, and taken from there if it was compiled before by the same version of Zig
         and of this module with the same options from the same files. The files are then all sources: those of the folder,

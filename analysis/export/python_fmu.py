@@ -233,9 +233,22 @@ _OPTIONS = {
 def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
     """Put the guard in the place of PythonFMU's libraries, which are renamed; return all files by path.
 
-    The C source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the
-    master gives. ``entries`` are the files by path in the archive, as PythonFMU's builder makes it, ``model`` is the model
-    identifier. BuildError is raised if the source does not compile.
+    The source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the master
+    gives.
+
+    Parameters
+    ----------
+    entries : mapping
+        Content of the files by path in the archive, as PythonFMU's builder makes it.
+    model : str
+        Model identifier of the FMU.
+    source : bytes
+        C source of the guard.
+
+    Raises
+    ------
+    BuildError
+        If the source does not compile.
     """
     guid = ElementTree.fromstring(entries["modelDescription.xml"]).attrib["guid"]
     found = {**entries, SOURCE: source, "resources/guid.txt": guid.encode()}

@@ -115,7 +115,10 @@ def _header(mechanism: Mechanism, coupled: Mapping[int, float]) -> str:
 
 
 def _torque_input(mechanism: Mechanism, crank: int) -> int:
-    """Return the index of the input that is the torque on the crank of index ``crank``; -1 without such an input or crank."""
+    """Return the index of the input that is the torque on the crank; -1 if there is none.
+
+    ``crank`` is the index of the crank among the degrees of freedom, -1 without a crank.
+    """
     return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 

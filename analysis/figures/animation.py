@@ -23,7 +23,11 @@ def check_frames(frames: int) -> None:
 
 @contextmanager
 def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tuple[Path, Callable[[], None]]]:
-    """Write a GIF; the context yields its path, another one if it may not be overwritten, and a function that adds a frame."""
+    """Write a GIF; the context yields the path of the file, and a function that adds the current figure as a frame.
+
+    If the current command may not overwrite the file, the GIF gets another name. The figure is laid out once, for the first
+    frame, so that its panels do not move between frames.
+    """
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=frames_per_second, metadata={})
 

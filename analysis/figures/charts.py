@@ -157,7 +157,10 @@ def _hatched_points(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.fl
 
 @register_picture
 def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
-    """Plot multipliers, or coexisting motions if they were searched for, with boundaries and the outcomes of long runs."""
+    """Plot the largest Floquet multiplier in colours, the stability boundaries, and the outcomes of long runs.
+
+    If coexisting motions were searched for, their number and amplitudes are plotted instead of the multiplier.
+    """
     x, y = chart.axes
     looks = {
         Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),

@@ -92,7 +92,10 @@ class _Margins(NamedTuple):
 
     @classmethod
     def from_loop(cls, system: Any) -> _Margins:
-        """Find the changes of gain nearest to 1, and the least change of phase, that make the closed loop unstable."""
+        """Find the margins of the open loop ``system``: the changes of gain or of phase that make the closed loop unstable.
+
+        The gain factors are those nearest to 1, and the change of phase is the smallest.
+        """
         poles = control.feedback(system, 1).poles()
         if not np.all(np.abs(poles) < 1.0 if system.isdtime(strict=True) else poles.real < 0.0):
             return cls(stable=False)

@@ -17,7 +17,9 @@ from .style import COLOURS, Figure
 def plot_decay(
     decay: Decay, record: tuple[ArrayLike, ArrayLike] | None = None, *, unit: str = "", title: str = ""
 ) -> Figure:
-    """Plot the turning points of a free decay with their envelope, and the decrement of each cycle, or the fitted curve.
+    """Plot the turning points of a free decay with their envelope, and the decrement of each cycle.
+
+    If the whole curve was fitted (see `Decay.whole`), plot the record and the fitted curve instead.
 
     Parameters
     ----------

@@ -157,7 +157,10 @@ def mechanism_drawer(parameters: object) -> Callable[[Any, Axes, Trajectory], st
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """Return the slice of a run's samples over which paths are drawn, the last ones of a long run, and its name in words."""
+    """Return the slice of a run's samples over which paths are drawn, and a phrase that names these samples.
+
+    For a long run the slice has only the last samples.
+    """
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"

@@ -32,7 +32,10 @@ VIEW = 2.2
 @plot.register
 @style.figure_style()
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
-    """Plot the poses with all dyads that guide the body through them, and the four-bars, of two dyads each, with defects."""
+    """Plot the poses with all dyads that guide the body through them; in panels below, plot the four-bars and their defects.
+
+    Each four-bar consists of two of the dyads.
+    """
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
@@ -146,7 +149,11 @@ def _pins(solution: Solution) -> dict[str, complex]:
 
 
 def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, named: bool = False) -> None:
-    """Draw the links in the first pose, the crank thick, in the colours of their ``dyads``, and ``named`` in the legend."""
+    """Draw the links in the first pose; the crank is a thick line.
+
+    If ``dyads`` are given, crank and rocker have the colours of their dyads; if ``named`` is true, the links have entries in
+    the legend.
+    """
     names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)
     pivots = np.array([MM_PER_METRE * dyad.pivot for dyad in dyads])

@@ -65,7 +65,10 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
 
 
 def _output_over_turn(turn: Turn, name: str) -> np.ndarray:
-    """Return an output over the period, with the value at its end: that at the start, for an angle plus whole turns."""
+    """Return an output over the period, with its value at the end of the period appended.
+
+    The appended value is the value at the start, for an angle plus whole turns.
+    """
     values = turn[name]
     whole = 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)) if name in turn.angles else 0.0
     return np.append(values, values[0] + whole)
@@ -94,7 +97,10 @@ def _title(orbit: PeriodicOrbit, period: float) -> str:
 
 @plot.register
 def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
-    """Plot the first coordinate that is not commanded over the crank angle, for all motions found; unstable ones are dashed."""
+    """Plot a coordinate of all motions found at one speed over the crank angle; unstable motions are dashed.
+
+    The coordinate is the first that is not commanded.
+    """
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)

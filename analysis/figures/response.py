@@ -245,9 +245,7 @@ def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Lab
         (special.kind, look.place(special.parameter)): special
         for branch in branches
         for special in branch.special
-        if special.kind is not Crossing.FOLD
-        # a machine reaches it if a motion beside it is stable
-        and any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
+        if special.kind is not Crossing.FOLD and _is_reachable(branch, special)
     }
     width = float(np.ptp(np.concatenate([branch.parameter for branch in branches])))
     groups: list[list[SpecialPoint]] = []
@@ -269,6 +267,11 @@ def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Lab
             text = f"{len(group)} {plural},\n{low.removesuffix(look.unit).rstrip()} to {high}"
         labels.append(Label(x=look.factor * middle.parameter, y=look.scale * middle.orbit.amplitude, text=text))
     return labels
+
+
+def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
+    """Return whether a motion beside a special point is stable, so that a machine can reach the point."""
+    return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 
 def _branch_curves(
@@ -307,7 +310,10 @@ def _branch_curves(
 
 
 def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
-    """Return the curves of ``y`` (display units) along branch ``number``, one per stability, in the colour of the period."""
+    """Return the curves of a quantity ``y`` (display units) along a branch, one for each kind of stability.
+
+    The colour shows the period. ``number`` is the index of the branch.
+    """
     words = _stability_words(branch)
     order = branch.periods.bit_length() - 1
     style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
@@ -451,7 +457,10 @@ def _comparison_points(branch: Branch) -> NDArray[np.int64]:
 def _visible_approximations(
     others: Sequence[_Approximation], branches: Sequence[Branch], look: _Scale, top: float
 ) -> list[Curve]:
-    """Return the curves of the approximations that differ visibly from the true motion; the y axis ends at ``top``."""
+    """Return the curves of the approximations that differ visibly from the true motion in a figure of usual size.
+
+    The y axis ends at ``top``.
+    """
     if not others:
         return []
     x = look.factor * others[0].parameter
@@ -517,7 +526,10 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
 
 
 def _without_overlaps(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
-    """Return letters that do not overlap if x spans ``width`` and the logarithmic y axis has ends of this ``ratio``."""
+    """Return letters without those that overlap others.
+
+    ``width`` is the range of the panel's x axis, ``ratio`` the quotient of the ends of its logarithmic y axis.
+    """
     points = 72.0 * 0.85 * np.array([_SIZE[0], 0.75 * _HARMONICS * _SIZE[1]]) / (width or 1.0, np.log(ratio))
     taken: list[FloatArray] = []
     kept = []
@@ -579,7 +591,10 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
 
 @register_picture
 def plot_branch(branch: Branch, *, title: str = "") -> Picture:
-    """Plot amplitude, harmonics, torque and pin force of a branch, with its special points, and shade the ranges to avoid."""
+    """Plot amplitude, harmonics, crank torque and pin force of one branch over its parameter, with its special points.
+
+    Ranges to avoid are shaded.
+    """
     low, high = float(branch.parameter.min()), float(branch.parameter.max())
     alone = Response(branches=(branch,), low=low, high=high, problems=())
     return describe_branches([branch], title=title, avoid=alone.speeds_to_avoid, caution=alone.caution)

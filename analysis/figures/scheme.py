@@ -31,7 +31,10 @@ _TRACED = 240
 
 
 def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
-    """Return joints' positions (mm), (n, 2), by name for ``coordinates`` (n, freedoms); NaN where it cannot be assembled."""
+    """Return the positions (mm) of a drawing's joints by name, shape (n, 2), for ``coordinates`` of shape (n, freedoms).
+
+    The positions are NaN at configurations at which the mechanism cannot be assembled.
+    """
     drawing = mechanism.drawing
     assert drawing is not None
     p = parameters.constants()
@@ -49,7 +52,10 @@ def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -
 def draw(
     axis: Axes, mechanism: Mechanism, parameters: Any, positions: dict[str, Array], *, letters: bool = True
 ) -> None:
-    """Draw a mechanism at the first of ``positions`` (see `joint_positions`), and its points' paths over all others."""
+    """Draw a mechanism at its first configuration, and the paths of its points over all other configurations.
+
+    ``positions`` are the positions of the joints as `joint_positions` returns them.
+    """
     drawing = mechanism.drawing
     assert drawing is not None
     now = {name: path[0] for name, path in positions.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from textwrap import fill
 from typing import Any
@@ -67,10 +67,7 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
         contents.append((joint.words, joint.unit, components))
     known = shown_units(units)
     # zero but for rounding, relative to the largest value with the same unit
-    sizes = {
-        name: max(float(np.nanmax(np.abs(np.ma.filled(x, np.nan)), initial=0.0)) for x in curves.values())
-        for name, _, curves in contents
-    }
+    sizes = {name: _largest(curves.values()) for name, _, curves in contents}
     scales = {si: max(sizes[name] for name, other, _ in contents if other == si) for _, si, _ in contents}
     zero = [name for name, si, _ in contents if sizes[name] <= _ZERO * scales[si]]
     still = {name: _constant_text(curves, *known[si]) for name, si, curves in contents if name not in zero}
@@ -84,8 +81,16 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5), notes=notes)
 
 
+def _largest(curves: Iterable[Any]) -> float:
+    """Return the largest magnitude of curves, masked values and NaN ignored."""
+    return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
+
+
 def _constant_text(curves: Mapping[str, Any], unit: str, factor: float) -> str:
-    """Return the value, in units of ``factor``, of a curve that is constant and the only one, as text with unit; else ""."""
+    """Return the value of a curve as text with unit if the curve is constant and the only one; otherwise an empty text.
+
+    ``factor`` is the size of ``unit`` in SI.
+    """
     values = np.concatenate([np.array(np.ma.filled(given, np.nan)) for given in curves.values()])
     values = values[np.isfinite(values)]
     constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
@@ -101,7 +106,10 @@ def _marked_angles(turn: ForceTurn) -> dict[str, float]:
 def _force_panel(
     turn: ForceTurn, title: str, si: str, unit: str, factor: float, components: Mapping[str, Any]
 ) -> Panel:
-    """Return a panel of curves, by label in SI, over the turn; its ``unit`` is ``factor`` times the SI unit ``si``."""
+    """Return a panel of the curves ``components``, given in SI by label, over the turn.
+
+    ``si`` is their unit in SI, ``unit`` the unit on the axis, and ``factor`` the size of ``unit`` in SI.
+    """
     angle = np.degrees(turn.angle)
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()

@@ -23,7 +23,11 @@ _LIGHT = np.array([-0.25, 0.75, 0.61])
 
 
 def cylinder(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
-    """Return a cylinder with closed ends and ``sides``, of ``pieces`` along its length, since `paint` orders faces by depth."""
+    """Return a cylinder with closed ends from ``start`` to ``end``.
+
+    The cylinder is divided along its length into ``pieces``, because `paint` orders faces by depth. ``sides`` is the number of
+    faces around the cylinder.
+    """
     way = (end - start) / np.linalg.norm(end - start)
     first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
     first /= np.linalg.norm(first)
@@ -51,7 +55,10 @@ def ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
 
 
 def box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *, pieces: int = 1) -> FloatArray:
-    """Return a box between corners in the frame ``rows`` (3, 3) at ``origin``, divided into pieces along its first axis."""
+    """Return a box from corner ``low`` to corner ``high``, divided into pieces along its first axis.
+
+    The corners (3,) are given in the frame with the origin ``origin`` and right-handed unit vectors in ``rows`` (3, 3).
+    """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     faces = []
     cuts = np.linspace(low[0], high[0], pieces + 1)

@@ -55,7 +55,10 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> style.Figure:
 def _path(
     start: tuple[float, float], end: tuple[float, float], number: int, lowest: float
 ) -> list[tuple[float, float]]:
-    """Return a connection's corners: straight to the right, else round below all parts (mm), each ``number`` in its lane."""
+    """Return the corners of a connection: directly to a part on the right, otherwise round below all parts.
+
+    ``number`` is the index of the connection, which gives it a lane of its own; ``lowest`` is the lower edge of the parts (mm).
+    """
     lane = _CLEAR + _LANE * (number % 9)
     if end[0] > start[0]:
         x = end[0] - lane

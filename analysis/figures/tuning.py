@@ -74,7 +74,10 @@ def _view_range(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def _curves(survey: Survey, value: object, colour: str, width: float, name: str, scale: float) -> Iterator[Curve]:
-    """Yield a quantity, the ``value`` of a branch, along all branches, unstable parts dashed; only the first has a ``name``."""
+    """Yield the curves of a quantity along the branches of a response, stable parts solid, unstable ones dashed.
+
+    ``value`` computes the quantity from a branch; only the first curve has the ``name`` in the legend.
+    """
     for branch in survey.response.branches:
         stable = branch.largest_multiplier <= 1.0
         for part, line in ((stable, "-"), (~stable, "--")):

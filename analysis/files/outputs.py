@@ -25,8 +25,8 @@ RECORD = ".linkwork"
 class Writing:
     """The command that now writes files, and what it may overwrite."""
 
-    command: str  # its name; it may always overwrite its own files
-    force: bool = False  # whether it may also overwrite other files
+    command: str  # name of the command; it may always overwrite its own files
+    force: bool = False  # whether the command may also overwrite other files
     # where each file was written: at its path, or beside a file that had to be kept
     paths: dict[Path, Path] = field(default_factory=dict)
     # sentences on the units assumed for files that were read and do not state them

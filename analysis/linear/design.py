@@ -115,7 +115,10 @@ class Design:
         return self.plant.loop(self.gains, self.integral_gain)
 
     def closed_loop(self, outputs: str | Sequence[str] | None = None) -> control.StateSpace:
-        """Return the closed loop from a disturbing force to the named outputs, by default the controlled coordinate."""
+        """Return the closed loop from a disturbing force to the outputs with the given FMI names.
+
+        The default output is the controlled coordinate.
+        """
         chosen = (self.coordinate,) if outputs is None else as_names(outputs)
         a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))

@@ -183,7 +183,7 @@ class _Balance:
             if any(mechanism.freedoms[n].mode is mode for n in held):
                 loose[place] = next((k for k, name in enumerate(mode.arguments) if name in forces), modes[place])
         self.parameters, self.inputs, self.channels, self.modes = parameters, inputs, channels[0], tuple(loose)
-        #: In these modes; ``its.free`` has the free and the held degrees of freedom.
+        #: Layout in these modes; ``its.free`` has the free and the held degrees of freedom.
         self.its = layout(mechanism, self.modes)
         #: Indices, in ``its.free``, of the degrees of freedom that are not held.
         self.free = [place for place, n in enumerate(self.its.free) if n not in held]
@@ -210,7 +210,10 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Find an equilibrium by Newton's method, halving steps that raise the imbalance; EquilibriumError if it fails."""
+        """Find an equilibrium by Newton's method; a step is halved while the imbalance would grow.
+
+        Raises EquilibriumError if the method does not converge.
+        """
         q, moved = guess.copy(), np.array(self.its.free)[self.free]
         before = self.imbalance(q[:, None])[0]
         for iteration in range(MOST_ITERATIONS):

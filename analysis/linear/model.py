@@ -401,7 +401,10 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zeros for work dissipated and supplied; keep full states."""
+    """Extend states, shape (n, 2 f), to full states, (n, 2 f + 2), by zeros for work dissipated and supplied.
+
+    Full states are returned unchanged.
+    """
     message = f"the states are {states!r}: they must be numbers in SI, such as the state of an Equilibrium"
     array, n = np.atleast_2d(float_array(states, message)), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:

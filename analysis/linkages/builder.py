@@ -282,8 +282,8 @@ class Builder:
     def rack(self, name: str, *, gear: str, rack: str, radius: Amount, offset: Amount | None = None) -> Builder:
         """Add a toothed rack, which slides on the body to which its ``gear`` is pinned.
 
-        ``radius`` is the travel of the rack per radian of the gear relative to that body (m), positive or negative. ``offset``
-        is the position of the rack when the angle of the gear is zero (m).
+        ``radius`` is the pitch radius of the gear (m): the travel of the rack per radian of the gear, both relative to that
+        body; it may be negative. ``offset`` is the position of the rack when the angle of the gear is zero (m).
         """
         return self._add("racks", name, gear=gear, rack=rack, radius=radius, offset=offset)
 
@@ -314,7 +314,7 @@ class Builder:
         at : str, optional
             A pin or a slide.
         bodies : (str, str), optional
-            Two bodies, which need not be joined: the rotation of the second relative to the first twists the spring. Whole
+            Two bodies, which need not be joined. The rotation of the second relative to the first twists the spring. Whole
             turns count if the angles of both follow from the freedoms alone, such as those of cranks and gears; otherwise the
             twist is at most half a turn in either direction.
         stiffness, damping : optional
@@ -357,8 +357,8 @@ class Builder:
         start : optional
             Initial angle or position (rad, m).
         speed : optional
-            Commanded rate (rad/s, m/s), at the start and as long as no input changes it; for a freedom that is not driven, its
-            initial rate. "0 rpm" commands rest.
+            Commanded rate (rad/s, m/s), at the start and as long as no input changes it. The whole number 0 means that no rate
+            is commanded; "0 rpm" commands rest. For a freedom that is not driven: its initial rate.
         driven : bool, optional
             Whether its rate can be commanded. By default this is true only of the first freedom that has a speed; if none
             has one, of the first freedom.

@@ -108,7 +108,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slide(Line):
-    """A block that slides along a line of another body without rotating relative to it; see `Builder.slide`."""
+    """A block that slides along a line of another body, by default of the ground, without rotating relative to it.
+
+    See `Builder.slide`.
+    """
 
     on: str = entry(_name, GROUND)
     body: str = entry(_name)
@@ -147,7 +150,7 @@ class Rack:
 class Spring:
     """A spring with damper and dry friction: between two points, about a pin, along a slide, or as a shaft between two bodies.
 
-    See `Builder.spring`. ``constants`` are values and units of the constants of the law, by name.
+    See `Builder.spring`. ``constants`` has the value and the unit of each constant in the formula of the law, by name.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -164,7 +167,15 @@ class Spring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointLoad:
-    """An input force at a point of a moving body, the first of those pinned there; its components are in the axes ``frame``."""
+    """An input force at a point.
+
+    Attributes
+    ----------
+    point : str
+        Name of the point, on a moving body; if several bodies are pinned there, the force acts on the first.
+    frame : str
+        Axes of the components: ``ground``, or ``body`` for the axes of the body on which the force acts.
+    """
 
     point: str = entry(_name)
     frame: str = entry(files.Choice((GROUND, BODY)), GROUND)

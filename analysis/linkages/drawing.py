@@ -119,7 +119,10 @@ class Picture:
         return f"({''.join(f'{quote(name)}, ' for name in moves[:2])})"
 
     def paths(self) -> list[str]:
-        """Return the points whose paths are drawn: those of moving bodies that are no joints, or else the last moving pin."""
+        """Return the points whose paths are drawn: all points of moving bodies that are not joints.
+
+        If there are none, return the last pin between moving bodies.
+        """
         moving = [own for body in self.description.bodies for own in self.interface.points[body]]
         alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
         return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

@@ -16,7 +16,10 @@ from .writing import function, record
 
 
 class PoseWriter:
-    """Writer of the function that computes the poses of all bodies of one linkage."""
+    """Writer of the function that computes the poses of all bodies of one linkage.
+
+    Its methods write lines of that function, or return expressions for them.
+    """
 
     def __init__(self, interface: Interface) -> None:
         self.structure, self.interface = interface.structure, interface
@@ -156,7 +159,10 @@ class PoseWriter:
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def derivative_tuple(self, terms: dict[int, str]) -> str:
-        """Return the source of the tuple of derivatives by the coordinates; ``terms`` has those that are not zero, by index."""
+        """Return the source of the tuple of derivatives with respect to the coordinates.
+
+        ``terms`` has the derivatives that are not zero, by index of the coordinate.
+        """
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
     def linear_turn(self, terms: dict[int, str], constants: Iterable[str]) -> str:

@@ -37,8 +37,8 @@ _ANGLES = (-2.0, -0.7, 0.3, 1.9)
 def law(value: Any, name: str) -> Law:
     """Read a force law: a formula, or the rows (x, force) of a table, whose units depend on the joint (see `expression`).
 
-    ParameterError is raised if a formula has anything but names, arithmetic and the known functions, or a table fewer than two
-    rows.
+    ParameterError is raised if a formula has anything but names, arithmetic and the known functions, or a table has fewer
+    than two rows.
     """
     if isinstance(value, list):
         return _ROWS(value, name)

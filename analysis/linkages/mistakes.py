@@ -13,7 +13,13 @@ from .laws import check_law
 
 
 def check_entries(description: Description) -> None:
-    """Raise LinkageError or ParameterError, with the place in the file, for the first entry that does not fit the others."""
+    """Check that the entries of a description fit together.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If an entry does not fit. The message says where it is in the file, and what would be right.
+    """
     d = description
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):
         raise ParameterError("linkage.name", d.name, "have letters, digits and hyphens, and begin with a letter")

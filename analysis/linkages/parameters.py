@@ -92,9 +92,18 @@ class Load(NamedTuple):
 class Interface:
     """The FMI interface of a described linkage: parameters, freedoms, loads, and the expressions of its points.
 
-    ``drives`` are the degrees of freedom, in the order of the coordinates. ``points`` and ``centres`` have the coordinates of
-    each point and of the centre of mass of each body that has a mass, in the frame of the body, as expressions in the
-    parameters.
+    Attributes
+    ----------
+    description : Description
+    structure : Structure
+    parameters : tuple of Parameter
+    drives : tuple of Drive
+        The degrees of freedom, in the order of the coordinates.
+    loads : tuple of Load
+    points : mapping
+        Coordinates of each point in the frame of its body, as expressions in the parameters.
+    centres : mapping
+        Coordinates of the centre of mass of each body, also as expressions in the parameters; massless bodies are left out.
     """
 
     description: Description
@@ -409,7 +418,10 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def spring_angle_name(description: Description, name: str) -> str:
-    """Return the name of the angle of a torsion spring: ``A.turn`` at a pin A with one spring, else with the spring's name."""
+    """Return the name of the angle of a torsion spring, such as ``A.turn``.
+
+    It begins with the name of the pin, or with that of the spring if the spring has no pin or the pin has several springs.
+    """
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
     return f"{pin if pin and alone else name}.turn"

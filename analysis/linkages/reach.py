@@ -40,20 +40,23 @@ class Reach(NamedTuple):
         Least clearance of any dyad in the range; the clearance of a dyad is the sine of its transmission angle.
     """
 
-    freedom: int  # index of the degree of freedom
-    unit: str  # of its coordinate, rad or m
+    freedom: int
+    unit: str
     low: float
     high: float
     open: tuple[bool, bool]
-    turns: bool  # whether the freedom can make a whole turn
-    least: float  # least clearance of any dyad in the range
+    turns: bool
+    least: float
 
 
 def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None) -> Reach:
-    """Find the range in which the coordinate of a degree of freedom, given by its index, can move.
+    """Find the range in which the coordinate of a degree of freedom can move.
 
     Parameters
     ----------
+    mechanism : Mechanism
+    freedom : int
+        Index of the degree of freedom.
     most : float, optional
         Greatest distance from the start that is searched, in both directions. If an angle has a limit in one direction only,
         the other is searched twice as far. By default half the period of the coordinate; if it is not periodic, four turns
@@ -131,8 +134,8 @@ class DeadCentre(NamedTuple):
         Coordinate of the freedom (rad, m).
     """
 
-    name: str  # of the body if it is pinned to the ground, or of its slide if it slides on the ground
-    at: float  # coordinate of the freedom (rad, m)
+    name: str
+    at: float
 
 
 def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list[DeadCentre]:

@@ -41,7 +41,10 @@ Joint = Pin | Slider
 
 
 class FreedomStep(NamedTuple):
-    """Step that adds a body whose joint with the known ``parent`` is a freedom; ``sign`` is -1 for the joint's first body."""
+    """Step that adds a body whose joint with the known body ``parent`` is a freedom.
+
+    ``sign`` is -1 if ``body`` is the first body of the joint, otherwise +1.
+    """
 
     body: str
     parent: str
@@ -143,7 +146,17 @@ Step = FreedomStep | GearStep | RackStep | Dyad
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Steps in the order in which the poses of a linkage are computed; ``bodies`` include the massless pins of slots."""
+    """Order in which the poses of a linkage are computed.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+        All moving bodies, including the massless pins of slots.
+    joints : mapping of str to Joint
+    freedoms : mapping of str to FreedomTable
+    steps : tuple of Step
+        In the order of the computation.
+    """
 
     bodies: tuple[str, ...]
     joints: Mapping[str, Joint]
@@ -157,7 +170,10 @@ class Structure:
 
 
 def joints(description: Description) -> dict[str, Joint]:
-    """Return the joints of a description by name; raise LinkageError for an unknown body or point, or a body without joint."""
+    """Return the joints of a description by name.
+
+    LinkageError is raised if a joint names a body or point that does not exist, or a body is joined to nothing.
+    """
     owners: dict[str, list[str]] = {name: [GROUND] for name in description.ground}
     for name, body in description.bodies.items():
         for own in body.all_points:
@@ -353,7 +369,10 @@ def _teeth_hint(description: Description, left: list[str]) -> str:
 
 
 def _choices(description: Description, found: Mapping[str, Joint], count: int) -> Iterator[tuple[str, ...]]:
-    """Yield the sets of ``count`` joints that, as freedoms, determine all poses; joints on the ground are tried first."""
+    """Yield the sets of ``count`` joints that, taken as freedoms, determine the poses of all bodies.
+
+    Joints on the ground are tried first.
+    """
     simple = [name for name, joint in found.items() if len(joint.bodies) == 2 and name not in description.slots]
     simple.sort(key=lambda name: GROUND not in found[name].bodies)
     return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])

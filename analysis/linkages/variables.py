@@ -210,7 +210,10 @@ class Variables:
 
 
 def _input(name: str, unit: str, text: str, of: str = "", rest: str = "") -> str:
-    """Return the source of an input's variable with further arguments ``rest``; its symbol is that of ``of``, if given."""
+    """Return the source of an input's variable; if ``of`` is given, the symbol is that of the variable ``of``.
+
+    ``rest`` is the source of further arguments.
+    """
     return f'Variable("{name}", "input", "{unit}", {quote(text)}, {quote(symbol(of or name, unit))}{rest})'
 
 

@@ -30,9 +30,12 @@ LEAST_SWING = 0.1
 _WINDOW = 1.0 / 6.0
 #: Rounds of the iteration between the friction and the waves, whose curvature jumps by an amount that depends on friction.
 _ROUNDS = 4
-#: Greatest residual of a fit of the whole curve, as a fraction of the record's range; number of samples that make the first
-#: guess; damping ratios of the guesses, and number of their frequencies.
-_MISFIT, _GUESSED, _RATIOS, _FREQUENCIES = 0.03, 400, (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8), 80
+#: Greatest residual of a fit of the whole curve, as a fraction of the record's range.
+_MISFIT = 0.03
+#: Greatest number of samples from which the fit of the whole curve gets its first guess.
+_GUESSED = 400
+#: Damping ratios that are tried for the first guess, each with this number of frequencies.
+_RATIOS, _FREQUENCIES = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8), 80
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
 

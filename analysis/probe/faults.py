@@ -43,7 +43,10 @@ class Fault:
 
 
 def swap_argument(position: int, value: Any) -> Change:
-    """Return a change that replaces an argument, counted from the end if negative, by ``value`` or, if callable, its result."""
+    """Return a change that replaces the argument at a position by ``value``; a negative position counts from the end.
+
+    If ``value`` is a function, the argument is replaced by its result.
+    """
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) <= position:

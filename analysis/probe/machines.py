@@ -5,9 +5,10 @@ have the functions that sections 2.3, 3.2 and 4.2 of FMI 3.0 list as allowed in 
 divided, as the text of the standard describes: `ready` is the state Instantiated after `SetupExperiment`, and `settled` is the
 event mode after an update that needs no further update. In FMI 3.0 `error` is the state Terminated, to which an error leads.
 
-A row with ``{type}`` is of the functions of all types of FMI 2. The cell of a function and a state is `x`: allowed; `.`: not
-allowed; `?`: not judged, because the standard does not decide; `e`: allowed if the importer uses the event mode; another letter
-or a digit: allowed for some variables, see `model.CONDITIONS`, where the digits are the standard's footnotes.
+A row with ``{type}`` holds for the functions of all types of variables of FMI 2: ``GetReal``, ``GetInteger`` and so on. The
+cell of a function and a state is `x`: allowed; `.`: not allowed; `?`: not judged, because the standard does not decide; `e`:
+allowed if the importer uses the event mode; another letter or a digit: allowed for some variables, see `model.CONDITIONS`,
+where the digits are the standard's footnotes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections import deque
 from dataclasses import dataclass
 
 _STATE = "GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState"
-#: Functions that are allowed in every state.
+#: Functions that are allowed in every state. FMI 2 and FMI 3 spell some names differently.
 _FMI3 = f"SetDebugLogging Reset {_STATE}"
 _FMI2 = _FMI3.replace("FMUState", "FMUstate").replace("Deserialize", "DeSerialize")
 
@@ -98,8 +99,9 @@ GetNumberOfContinuousStates  x ? x x ? ?
 GetNumberOfEventIndicators   x ? x x ? ?
 """
 
-#: Types of variables of FMI 2, and of FMI 3 that change continuously, and that do not.
+#: Types of variables of FMI 2.
 _TYPES = ("Real", "Integer", "Boolean", "String")
+#: Types of variables of FMI 3: those that can change continuously, and those that cannot.
 FLOATS = ("Float32", "Float64")
 DISCRETE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
 

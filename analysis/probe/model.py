@@ -230,7 +230,10 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
 
 
 def _capabilities(folder: Path, interface: str) -> set[str]:
-    """Return the capability flags of an interface that are true, from the XML file, as FMPy does not read all of them."""
+    """Return the names of the capability flags of an interface that are true.
+
+    The flags are read from the XML file, because FMPy does not read all of them.
+    """
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])
     return set() if element is None else {name for name, value in element.items() if value in ("true", "1")}

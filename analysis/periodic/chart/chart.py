@@ -395,7 +395,10 @@ class _Survey:
             )
 
     def follow_lines(self, ys: Sequence[float], progress: bool, what: str) -> None:
-        """Follow all branches on lines y = const, and boundaries from their special points; ``what`` is the bar's text."""
+        """Follow the branches of all motions on the lines y = const; follow a boundary from each special point of a branch.
+
+        ``what`` is the text of the progress bar.
+        """
         lost: list[str] = []
         with show_progress(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys):
@@ -421,7 +424,10 @@ class _Survey:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow the boundary through a special point at the values ``place`` of both parameters, unless it is known."""
+        """Follow the boundary through a special point of a branch, unless this boundary is already known.
+
+        ``place`` has the values of the two parameters at the point.
+        """
         if self._is_known(special, place):
             return
         what, box = f"the {special.kind.value} at {self.place(*place)}", self.box

@@ -48,7 +48,10 @@ class VaryingInputError(InputError):
 
 
 class NothingFreeError(InputError):
-    """All freedoms are commanded, so that none can oscillate; ``force`` is an input that would free one, or empty."""
+    """All degrees of freedom are commanded, so that none can oscillate.
+
+    ``force`` is an input that would free one of them; it is empty if there is none.
+    """
 
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
@@ -438,7 +441,10 @@ def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return ``drive`` or, if it is None, that of a published set, which holds freedoms at the set's initial values."""
+    """Return ``drive``; if it is None, return the drive of a published set.
+
+    In the drive of the set, held degrees of freedom are at the set's initial values.
+    """
     return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
 
 

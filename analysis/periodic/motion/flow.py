@@ -54,7 +54,10 @@ def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 @cache
 def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
-    """Return the index of the degree of freedom of a crank, or of a link that may go round, by one of its FMI names."""
+    """Return the index of the degree of freedom of a crank, or of a link that swings and may go round.
+
+    ``name`` is one of the FMI names of the crank or link.
+    """
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
     return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
@@ -103,25 +106,64 @@ class Flow:
 
     Other cranks and undriven links have a ratio to the crank whose angle is the independent variable. Commanded cranks turn
     exactly at their ratio; cranks under a torque and undriven links turn at their ratio on average. For cranks under a torque
-    and undriven links, y contains the angle minus the ratio times the crank angle: this difference is periodic. The ratio of a
-    link that only swings is 0.
+    and undriven links, y contains the angle minus the ratio times the crank angle: this difference is periodic. The ratio of
+    a link that only swings is 0.
 
-    ``modes`` are the values of the mechanism's modes; ``crank`` is the index of the cyclic degree of freedom whose angle is the
-    independent variable. After ``base`` periods of the crank all cranks, and all links that go round, have made whole turns;
-    this time is divided into ``commons`` common periods of the cranks and of the rotations that springs couple to them.
+    Parameters
+    ----------
+    mechanism : Mechanism
+    modes : tuple of int
+        Values of the mechanism's modes.
+    crank : int
+        Index of the cyclic degree of freedom whose angle is the independent variable.
+    base : int
+        Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
+    commons : int
+        Number of common periods of the cranks, and of the rotations that springs couple to them, in ``base`` periods of the
+        crank.
+
+    Attributes
+    ----------
+    others : tuple of int
+        Indices of the other degrees of freedom that turn, or swing and may go round.
+    free : tuple of int
+        Indices of the degrees of freedom other than the crank whose coordinates and rates are in y. A degree of freedom that is
+        commanded without a ratio is held in place.
+    torque : bool
+        Whether a torque drives the crank: the crank's rate is then in y.
+    motors : int
+        Index of the first motor parameter in the drive vector, after the channels; each of `Mechanism.torques` has three.
+    held : int
+        Index in the drive vector of the coordinates at crank angle 0, one for each degree of freedom; they are used for degrees
+        of freedom that are held or have a ratio. The ratios of ``others`` follow.
+    components : tuple of (str, str)
+        FMI name and unit of each component of y.
+    labels : tuple of str
+        Names of the components of y in messages: short symbols where there are any.
+    places : tuple of int
+        Index of each component of y in the state of a run.
+    size : int
+        Number of components of y.
+    swing_count : int
+        Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
+        crank's speed if there are none.
+    rest : ndarray, shape (n,)
+        y with the coordinates at which the mechanism starts by default, and rates of zero.
+    angle_periods : ndarray, shape (n,)
+        Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0
+        for an angle that a spring couples to others, too: a whole turn of it alone winds the spring up.
+    swinging : dict of str to int
+        Indices in y of the coordinates of undriven links that may go round, by FMI name.
     """
 
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int, commons: int) -> None:
         self.mechanism, self.modes, self.crank, self.base, self.commons = mechanism, modes, crank, base, commons
-        #: Indices of the other degrees of freedom that turn, or swing and may go round.
         self.others = tuple(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0 and n != crank)
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
         forced = {c.argument for c in mechanism.channels if c.kind == "force"}
         self.command = commanded.get(self.crank)
         self.commanded = {n: commanded[n] for n in self.others if n in commanded}
-        #: Indices of the degrees of freedom other than the crank whose coordinates and rates are in y. A degree of freedom that
-        #: is commanded without a ratio is held in place.
         self.free = tuple(
             n
             for n, freedom in enumerate(mechanism.freedoms)
@@ -129,10 +171,8 @@ class Flow:
             and n not in commanded
             and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
         )
-        #: Whether a torque drives the crank: the crank's rate is then in y.
         self.torque = self.command is None
         rates = len(mechanism.freedoms)
-        #: Index of each component of y in the state of a run.
         self.places = (*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque))
         variables = {v.name: v for v in mechanism.variables}
         freedoms = [mechanism.freedoms[n] for n in self.free]
@@ -143,25 +183,15 @@ class Flow:
             f"{name}'" if name == variables[f.coordinate].symbol else label(variables[f.rate])
             for f, name in zip(freedoms, labels)
         ]
-        #: Names of the components of y in messages: short symbols where there are any; FMI name and unit of each component.
         self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
         self.components = tuple((name, variables[name].unit) for name in names)
         self.size, free = len(names), len(freedoms)
-        #: Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
-        #: crank's speed if there are none.
         self.swing_count = free or self.size
         initial = mechanism.state(mechanism.initial())
-        #: y with the coordinates at which the mechanism starts by default, and rates of zero; period of each component of y,
-        #: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0 for an angle that a spring
-        #: couples to others, too: a whole turn of it alone winds the spring up.
         self.rest, self.angle_periods = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]
         self.angle_periods[:free] = [0.0 if freedom.coupled else freedom.period for freedom in freedoms]
-        #: Indices in y of the coordinates of undriven links that may go round, by FMI name.
         self.swinging = {freedom.coordinate: place for place, freedom in enumerate(freedoms) if freedom.swings}
-        #: The drive vector has the channels; from ``motors`` on three parameters of each of `Mechanism.torques`; from ``held``
-        #: on the coordinates at crank angle 0, which are used for degrees of freedom that are held or have a ratio; and the
-        #: ratios of ``others``.
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
         self.drive_size = self.held + rates + len(self.others)
@@ -170,7 +200,10 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Return the crank angle (rad) of the common period of all that goes round: one turn if only the crank does."""
+        """Return the crank angle (rad) of the common period of the crank and of everything else that goes round.
+
+        It is one turn if only the crank goes round.
+        """
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
@@ -217,7 +250,10 @@ class Flow:
         return tuple(self._plain_state(0.0, y.tolist(), drive.tolist() if drive.ndim == 1 else list(drive), 0.0))
 
     def _plain_state(self, angle: Any, y: Sequence[Any], drive: Sequence[Any], zero: Any) -> list[Any]:
-        """Return the state of a run at a crank angle, except for turns by ratios, as a list of numbers or symbols."""
+        """Return the state of a run at a crank angle, as a list of numbers or symbols.
+
+        The rotations of other cranks and links by their ratios are not added.
+        """
         rates = len(self.mechanism.freedoms)
         x = [*drive[self.held : self.held + rates], *[zero] * (rates + 2)]
         x[self.crank] = angle
@@ -241,7 +277,10 @@ class Flow:
         return self.angle_periods * np.round(away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0))
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the turns per turn of the crank, from the drive vector, of each coordinate in y that goes round, by name."""
+        """Return the turns per turn of the crank of each coordinate in y that goes round, by FMI name.
+
+        These ratios are taken from the drive vector.
+        """
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 

@@ -318,7 +318,10 @@ class PeriodicOrbit(NotebookResult):
         return verdict(self.multipliers, tolerance)
 
     def sample(self, angles: ArrayLike) -> FloatArray:
-        """Return run state and channels at increasing crank angles (rad), (m, states + inputs); OrbitError on failure."""
+        """Return the state of a run and the channels at increasing crank angles (rad), shape (m, states + inputs).
+
+        Raises OrbitError if the integration fails.
+        """
         places = np.array(angles, dtype=float, ndmin=1)
         rows = np.empty((len(places), self.point.mechanism.size + self.flow.inputs))
         stations, starts = (np.zeros(1), self.start[None, :].copy())
@@ -381,8 +384,8 @@ class PeriodicOrbit(NotebookResult):
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""
         equations, p = self.point.mechanism.equations, self.parameters.constants()
         modes, turn = tuple(float(value) for value in self.flow.modes), self.turn(samples)
-        samples_of = zip(turn.states.tolist(), turn.inputs.tolist())
-        return min(abs(equations.clearance(x, equations.apply_inputs(modes, u, p), p)) for x, u in samples_of)
+        pairs = zip(turn.states.tolist(), turn.inputs.tolist())
+        return min(abs(equations.clearance(x, equations.apply_inputs(modes, u, p), p)) for x, u in pairs)
 
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Return the determinant of the monodromy matrix from the trace of the Jacobian of dy/dangle along the orbit.
@@ -494,7 +497,10 @@ def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> 
 
 
 def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return the full turns that undriven links without a given ratio make in the period after a start, by FMI name."""
+    """Return the full turns that undriven links without a ratio in the drive make in the period after a start, by FMI name.
+
+    Links that only swing are left out.
+    """
     flow, ratios = point.flow, point.drive.ratios_by_freedom(point.mechanism)
     swinging = {name: i for name, i in flow.swinging.items() if flow.free[i] not in ratios}
     if not swinging:

@@ -93,7 +93,10 @@ class Sweep:
 
     @property
     def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-        """Half the range of the first free coordinate (m or rad) at each speed, (m,); masked without a steady motion."""
+        """Half the range of the first free coordinate at each speed, shape (m,); masked where there is no steady motion.
+
+        The unit is m for a slider, rad for an angle.
+        """
         values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
         return np.ma.masked_invalid(np.array(values))
 
@@ -296,7 +299,10 @@ class Orbits(NotebookResult):
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return the end of an error message: which motions with links that go round were not sought; empty if none can."""
+    """Return the end of an error message, which says which motions with links that go round were not sought.
+
+    The result is empty if no link can go round.
+    """
     names = list(drive.flow(find_mechanism(parameters)).swinging)
     if not names:
         return ""

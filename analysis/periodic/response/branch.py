@@ -632,6 +632,9 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
 
 
 def has_motion(branches: Iterable[Branch], orbit: PeriodicOrbit, value: float, width: float) -> bool:
-    """Return whether a branch passes through a motion, which may begin at any turn of its period; see `passes`."""
+    """Return whether one of the branches passes through a motion, which may be taken to begin at any turn of its period.
+
+    For ``value`` and ``width`` see `passes`.
+    """
     starts = orbit.passages()
     return any(passes(b, value, start, width) for b in branches if b.turns == orbit.turns for start in starts)

@@ -222,7 +222,10 @@ class Response(NotebookResult):
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Return the local maxima of all free coordinates' amplitudes by parameter, for motions of one common period."""
+        """Return the local maxima of the amplitudes of all free coordinates, sorted by parameter.
+
+        Motions with a multiplied period are left out.
+        """
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
@@ -432,7 +435,8 @@ class _Search:
                 except ContinuationError:
                     without.append(self.family.format_value(special.parameter))
                     continue
-                self._keep(branch, largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest)
+                strayed = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
+                self._keep(branch, strayed=strayed)
                 doubled.append(branch)
                 ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
                 if self.stop():
@@ -507,13 +511,14 @@ class _Search:
                 place = self.family.format_value(value)
                 self.problems.append(f"the branch through a further motion at {place} is not followed: {error}")
                 continue
-            self._keep(branch, turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit)
+            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
+            self._keep(branch, strayed=strayed)
 
     def _knows(self, orbit: motion.PeriodicOrbit, value: float) -> bool:
         """Return whether a known branch passes through a motion."""
         return has_motion(self.branches, orbit, value, self.high - self.low)
 
-    def _keep(self, branch: Branch, strayed: bool = False) -> None:
+    def _keep(self, branch: Branch, *, strayed: bool = False) -> None:
         """Keep a branch with its problems; ``strayed`` tells that it ends where its motions become too unstable."""
         self.branches.append(branch)
         self.problems += branch.problems
@@ -546,7 +551,10 @@ _SAME_VALUE = 0.01
 
 
 def _values_to_search(response: Response, places: int) -> list[float]:
-    """Return values of the parameter at which to seek all motions: evenly spaced, and the highest maxima of the coordinates."""
+    """Return the values of the parameter at which all motions are sought, in increasing order.
+
+    They are evenly spaced values, and the values at the highest maximum of each free coordinate.
+    """
     values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
     reach = _SAME_VALUE * (response.high - response.low)
     highest: dict[int, Extremum] = {}
@@ -565,9 +573,9 @@ def with_isolas(
     """Return a response with further branches: motions that are not connected to any of its branches, such as isolas.
 
     All motions are sought at several values of the parameter, and at the highest resonance of each free coordinate, above which
-    isolas often lie. Motions that exist only between these values are not found. From each motion that lies on no
-    branch, a new branch is followed in both directions until it closes or ends. Motions whose deviations grow more than a
-    thousandfold per turn are ignored.
+    isolas often lie. Motions that exist only between these values are not found. From each motion that lies on no branch, a new
+    branch is followed in both directions until it closes or ends. Motions whose deviations grow more than a thousandfold per
+    turn are ignored.
 
     Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling these
     motions still exist, increasingly unstable, over a range about ten times as wide, where the search can find them. They are
@@ -577,7 +585,8 @@ def with_isolas(
     ----------
     response : Response
     places : int
-        Number of values of the parameter, evenly spaced inside the range, at which all motions are sought beside the maxima.
+        Number of values of the parameter, evenly spaced inside the range, at which all motions are sought, in addition to
+        the highest resonances.
     turns : int
         Greatest number of turns (common periods) in the period of the motions that are sought.
     greatest_step, progress

@@ -153,7 +153,10 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Return right and left eigenvector, with the product 1, of the eigenvalue nearest to ``value``, and this eigenvalue."""
+    """Return the right and left eigenvectors of the eigenvalue nearest to ``value``, and this eigenvalue.
+
+    The eigenvectors are scaled so that their product is 1.
+    """
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -260,7 +263,10 @@ def _is_transcritical(forms: Forms, cubic: float) -> bool:
 
 
 def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
-    """Return the derivative of the map over a period by the parameter at a fold, projected on the left eigenvector."""
+    """Return the derivative of the map over a period with respect to the parameter, at a fold.
+
+    The derivative is projected on the left eigenvector.
+    """
     _, p, _ = _eigenvectors(forms.matrix, 1.0)
     point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
@@ -306,8 +312,8 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
 
     def find_nearby(value: float) -> PeriodicOrbit:
-        at = special.orbit
-        return newton_orbit(*family.operation(value), turns=at.turns, start=at.start, settle=False)
+        parameters, drive = family.operation(value)
+        return newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
 
     step = 1e-3 * max(abs(special.parameter), 1e-9)
     largest = [find_nearby(special.parameter + sign * step).largest for sign in (-1.0, 1.0)]
@@ -451,7 +457,7 @@ def confirm(
     used = np.maximum(np.abs(away @ measure), TINY)[: max(2, outside[0]) if len(outside) else None]
     if len(used) < 2:
         raise LinkworkError(f"the run beside the orbit ends within a turn: {message}")
-    # by regression of the logarithms
+    # growth factor per turn, by regression of the logarithms
     growth = exp(float(np.polyfit(np.arange(len(used)), np.log(used), 1)[0]))
     factor = growth ** len(used)
     if factor > NOTABLE or size.max() > NOTABLE * LINEAR:

@@ -9,7 +9,7 @@ All derivatives are exact, up to the resolution of the collocation; none is a fi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -309,7 +309,10 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
 
 def extremum_orbit(orbit: PeriodicOrbit, along: str, coordinate: int = 0) -> PeriodicOrbit:
-    """Return the motion at an extremum of the amplitude over a parameter, from one near it: see `extremum_gradient`."""
+    """Return the motion at an extremum of the amplitude over a parameter, starting from a motion near the extremum.
+
+    See `extremum_gradient`.
+    """
     return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude", coordinate)
 
 
@@ -375,11 +378,19 @@ def crossing_gradient(
 
 
 def _point_gradient(motion: MotionGradient, place: FloatArray, amplitude: float, by: FloatArray) -> PointGradient:
-    """Build the gradient of a point that moves along the last name, from the derivatives of its place and amplitude."""
+    """Build the gradients of the place and the amplitude of a special point.
+
+    The place is the value of the last parameter of ``motion``. ``place`` and ``by`` are the derivatives of the place and of the
+    amplitude with respect to the other parameters.
+    """
     *others, along = motion.names
-    own = Gradient(value=float(motion.values[-1]), names=tuple(others), by=place, at=motion.values[:-1])
-    size = replace(own, value=amplitude, by=by)
-    return PointGradient(along=along, place=own, amplitude=size, orbit=motion.orbit)
+    names, at = tuple(others), motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=names, by=place, at=at),
+        amplitude=Gradient(value=amplitude, names=names, by=by, at=at),
+        orbit=motion.orbit,
+    )
 
 
 def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
@@ -489,7 +500,10 @@ def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
 
 
 def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
-    """Return the derivatives, (m,), of a function of the parameters that is zero with a multiplier on the unit circle."""
+    """Return the derivatives of a function of the m parameters that is zero where the multiplier is on the unit circle.
+
+    The shape is (m,).
+    """
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
         return left @ motion.variations.final_deviation(motion.variations.forcing)
