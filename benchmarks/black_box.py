@@ -117,8 +117,8 @@ class BlackBox:
     """Quality function and constraint violations of a task for one assembly of the linkage, as functions of the unknowns.
 
     The unknowns are the free ones of `constraints.UNKNOWNS` and, for an open path, the crank rotation over which it is traced.
-    Methods take m linkages at once: ``x`` has the shape (m, k). ``low`` and ``high``, shape (k,), are the bounds; angles are
-    within a turn.
+    Methods take m linkages at once: ``x`` has the shape (m, k). ``low`` and ``high``, shape (k,), are the bounds of the
+    unknowns; angles are within a turn.
     """
 
     def __init__(self, normal: Normal, limits: Limits, branch: int) -> None:

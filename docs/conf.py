@@ -63,7 +63,10 @@ LINKS = (
 
 
 def relink(text: list[str]) -> None:
-    """Replace links to files by links to pages of the site in a source page, the only element of ``text``, in place."""
+    """Replace links to files of the repository in a source page by links to pages of the site.
+
+    ``text`` has the page as its only element, as Sphinx passes it; it is changed in place.
+    """
     for pattern, replacement in LINKS:
         text[0] = re.sub(pattern, replacement, text[0])
 
@@ -78,7 +81,10 @@ def write_formula(translator: Any, node: Any) -> None:
 
 
 def list_commands(app: Any, name: str, text: list[str]) -> None:
-    """Add every command to the page of commands, as Sphinx does not see members that groups import when called."""
+    """Add every command with its options to the page of commands.
+
+    Sphinx cannot list the commands by itself, because groups of commands import their members only when called.
+    """
     if name != "reference/commands":
         return
     for command, (module, _) in COMMANDS.items():

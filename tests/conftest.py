@@ -171,6 +171,6 @@ def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
 
 @pytest.fixture
 def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """Return a function that calls the command line, in a folder of its own."""
+    """Return a function that calls the command line with the given words, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     return scripts.linkwork

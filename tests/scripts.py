@@ -23,7 +23,10 @@ def called(
 
 
 def linkwork(typed: str, *words: object, code: int = 0) -> Result:
-    """Call the command line, which must exit with ``code``: words as they are typed, and more of them, one each."""
+    """Call the command line, which must exit with ``code``.
+
+    ``typed`` is a line as it is typed in a shell; each of ``words`` is passed as one more argument.
+    """
     done = CliRunner().invoke(cli.main, [*shlex.split(typed), *map(str, words)], catch_exceptions=False)
     assert done.exit_code == code, done.output
     return done

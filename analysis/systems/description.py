@@ -39,11 +39,21 @@ def _flat_table(value: Any, name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTable:
-    """Table of a part of a system: a case, one of `PARTNERS`, one of `CONTROLLERS` or an FMU, and start values.
+    """Table of a part of a system: a case, a partner, a controller or an FMU, and start values.
 
-    A case is a published set, or a case file or linkage file: it gives the parameters and the initial state. An FMU is of FMI
-    2.0 or 3.0, from any tool. ``values`` are start values of parameters and inputs, by FMI name: texts with units, or numbers
-    in SI. A list with the name ``table`` sets ``table_0``, ``table_1`` and so on.
+    Attributes
+    ----------
+    case : str
+        A published set, or a case file or linkage file: it gives the parameters and the initial state.
+    partner : str
+        One of `PARTNERS`.
+    controller : str
+        One of `CONTROLLERS`.
+    fmu : str
+        An FMU of FMI 2.0 or 3.0, from any tool.
+    values : mapping
+        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list with the name ``table``
+        sets ``table_0``, ``table_1`` and so on.
     """
 
     case: str = entry(files.text, "")

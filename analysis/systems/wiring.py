@@ -67,10 +67,11 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """An FMU of a system, for co-simulation of FMI 2.0 or 3.0: all its variables, and its model description as read by FMPy.
+    """An FMU of a system, for co-simulation with FMI 2.0 or 3.0.
 
-    ``values`` are start values; all other variables have the start values of the FMU. ``feeds`` has the inputs on which an
-    output depends directly, by the name of the output.
+    ``ports`` are all its variables. ``values`` are start values of some of them; the others have the start values of the FMU.
+    ``feeds`` has the inputs on which an output depends directly, by the name of the output. ``description`` is the model
+    description as read by FMPy.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Part:
 
     @classmethod
     def from_fmu(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
-        """Read a part from its FMU; raise InputError if the file is none.
+        """Read a part from its FMU; raise InputError if the file is no FMU.
 
         WiringError is raised if the FMU is not for co-simulation with FMI 2.0 or 3.0, a name in ``values`` is no parameter or
         input of it, or a value is not of the type of its variable.

@@ -83,7 +83,10 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:
-    """Compute the `Expansion` of the motion at a spot, periodic or not, from first and second variational equations."""
+    """Compute the `Expansion` of the motion at a spot from the first and second variational equations.
+
+    The motion need not be periodic.
+    """
     along = periodic.motion_gradient(motion(wish, spot), (wish.over, *wish.names))
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)

@@ -470,7 +470,10 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """Yield the conditions that follow from a survey; a move for each new region is added to ``ways``."""
+    """Yield the conditions that follow from the regions, minima, resonances and outputs of a survey.
+
+    A move for each new region is added to ``ways``.
+    """
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []

@@ -184,7 +184,10 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return half the range of m Fourier series, shape (m,), given their cosine and sine coefficients, each (m, n + 1)."""
+    """Return half the range of values of each of m Fourier series, shape (m,).
+
+    The series are given by their cosine and sine coefficients, each of shape (m, n + 1).
+    """
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
     phase = np.multiply.outer(n, angle)

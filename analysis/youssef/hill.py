@@ -211,13 +211,19 @@ def determinant(equation: PeriodicEquation) -> float:
 
 
 def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
-    """Return the matrix (size, size), entry (n, k) the coefficient n - k of a series, that multiplies a function by it."""
+    """Return the matrix that multiplies a function, given by its coefficients of exp(i k x), by a series.
+
+    Entry (n, k) is coefficient n - k of the series; the shape is (size, size).
+    """
     index = np.arange(size)
     return series.to_order(size).exponential[size + index[:, None] - index]
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
-    """Return harmonics k, symmetric about 0, up to ``order``: whole for the multiplier +1, half-integers for -1."""
+    """Return the harmonic numbers k, symmetric about 0, up to ``order``.
+
+    They are whole numbers for the multiplier +1 (period 2 pi), half-integers for the multiplier -1 (period 4 pi).
+    """
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
     return first + np.arange(count, dtype=float)
 

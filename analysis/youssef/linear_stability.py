@@ -49,7 +49,10 @@ def linear_verdict(parameters: FiveBarParameters, drive: Drive) -> StabilityVerd
 
 
 def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
-    """Return a cached function of points (x, y) of a plane: the monodromy matrix of the linear equation at ``operation``."""
+    """Return a function that computes, and caches, the linear equation's monodromy matrix at a point of a plane of parameters.
+
+    ``operation`` returns parameters and drive at a point (x, y) of the plane.
+    """
 
     @cache
     def matrix(x: float, y: float) -> NDArray[np.float64]:
@@ -59,7 +62,10 @@ def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> M
 
 
 def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """Return a function over a plane, zero where the linear equation has the ``multiplier``, +1 or -1; see `plane_test`."""
+    """Return a function over a plane of parameters that is zero where the linear equation has the given multiplier, +1 or -1.
+
+    See `linear_monodromy` and `analysis.periodic.plane_test`.
+    """
     return plane_test(linear_monodromy(operation, variant=variant), multiplier)
 
 

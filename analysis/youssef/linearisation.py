@@ -245,7 +245,10 @@ class SliderEquation:
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
 
     def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-        """Return a = M, b = M' + lambda_c and c = lambda_k^2 + K, with their factors, of a zeta'' + b zeta' + c zeta = F."""
+        """Return the coefficients a, b, c of a zeta'' + b zeta' + c zeta = F.
+
+        They are M, M' + lambda_c and lambda_k^2 + K, with the factors of lambda_c and lambda_k^2.
+        """
         whole = self.homogeneous().stiffened(self.spring)
         return whole.a, whole.b, whole.c
 
@@ -330,7 +333,10 @@ def _without_spring(p: Constants, load: Load) -> tuple[Constants, Load]:
 def _exact_coefficients(
     p: Constants, speed: float, load: Load, order: int | None
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) as series, from as many samples as they need."""
+    """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) as series over the crank angle, from exact samples.
+
+    The number of samples is doubled until the highest harmonics are negligible.
+    """
     bare, loaded = _without_spring(p, load)
     samples = FEWEST_SAMPLES if order is None else max(FEWEST_SAMPLES, 4 * order)
     while True:

@@ -69,7 +69,10 @@ class Coefficients(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """Dimensionless parameters: l2/l4, l3/l4, p45 = m4/(m4 + m5) and I4 = rocker inertia/(m4 l4^2)."""
+    """Dimensionless parameters that determine the coefficients.
+
+    They are l2/l4, l3/l4, p45 = m4/(m4 + m5) and I4 = rocker inertia/(m4 l4^2).
+    """
 
     sigma2: float
     sigma3: float
@@ -97,7 +100,10 @@ def ratios(parameters: FiveBarParameters) -> Ratios:
 
 
 def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
-    """Return the coefficients that follow (4.21), P1's illegible sign from H1, and the force from the program listings."""
+    """Return the coefficients that the thesis lists after (4.21).
+
+    The sign of P1 is illegible and is taken from H1; the force is taken from the program listings.
+    """
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
     # all divided by their common factor sigma3^2
@@ -113,7 +119,10 @@ def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
 
 
 def listed(ratios: Ratios, datum: Datum = DATUM, function: Callable[[float], float] = cos) -> Coefficients:
-    """Return the coefficients at label 17 of appendices 2 and 4; with ``function=sin`` the slip of appendix 3 for a cosine."""
+    """Return the coefficients computed at label 17 of the listings in appendices 2 and 4.
+
+    ``function=sin`` repeats the slip of appendix 3, a sine for the cosine of alpha - alpha4.
+    """
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
     cf04 = function(alpha - a4)

@@ -182,7 +182,11 @@ def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
 
 
 def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[float, float]:
-    """Return P (m) at crank angle and u; an angle beyond a limit by rounding moves towards ``middle`` of its range."""
+    """Return P (m) at the crank angle ``th2``, for slider position u.
+
+    If rounding puts the angle beyond a limit of assembly, the angle is moved slightly towards ``middle``, the middle of its
+    range.
+    """
     share = 1e-16
     angle = th2
     while True:

@@ -94,19 +94,19 @@ def phone(browser: Browser) -> Iterator[Any]:
 
 
 def marked(mark: str, values: Iterable[Any]) -> Iterator[Any]:
-    """Mark the values of a parametrized test, "slow" or "long"; a tuple is of several parameters."""
+    """Mark the values of a parametrized test as "slow" or "long"; a tuple has the values of several parameters."""
     for value in values:
         yield pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=getattr(pytest.mark, mark))
 
 
 def run_case(case: Case, **options: Any) -> Trajectory:
-    """Run a case in process, with options of `simulate` in the place of its own."""
+    """Run a case in this process; ``options`` of `simulate` replace those of the case."""
     own = {"initial": case.initial, "stop_time": case.stop_time, "step": case.step}
     return simulate(case.parameters, case.inputs, **own | options)
 
 
 def cells(output: str) -> dict[str, list[str]]:
-    """Return the cells of the rows of printed tables, by the first one."""
+    """Return the cells of each row of printed tables, by the first cell of the row."""
     lines = ([cell.strip() for cell in line.strip("│").split("│")] for line in output.splitlines() if "│" in line)
     return {first: rest for first, *rest in lines}
 

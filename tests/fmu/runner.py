@@ -37,8 +37,9 @@ def run_in_process(
 ) -> Any:
     """Run the source of the function ``code`` with ``args`` in a new Python process, and return its result.
 
-    The function imports inside itself what it needs, but for json, sys, Path and the master `Fmu` of ``bare_master``. Arguments
-    and result are sent as JSON, which represents floats without loss. If the process dies, the test fails with its output.
+    The names json, sys, Path, and DISCARD, ERROR and `Fmu` of ``bare_master`` are imported for the function; it imports inside
+    itself what else it needs. Arguments and result are sent as JSON, which represents floats without loss. If the process dies,
+    the test fails with the output of the process.
     """
     source = _FRAME.format(helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__)
     with tempfile.TemporaryDirectory(prefix="linkwork-test-") as folder:

@@ -165,7 +165,10 @@ def _first_order_quotient(part: FourierSeries, divisor: FourierSeries) -> tuple[
 
 
 def expansion_errors(sigma2: float) -> dict[str, FloatArray]:
-    """Return the errors of (4.23) to (4.28) by name: magnitudes of mean and harmonics 1 and 2 of the quotients' errors."""
+    """Return the errors of the expansions (4.23) to (4.28) of the quotients in (4.21), as printed, by name.
+
+    Each error is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
+    """
     parts = printed(ratios(with_crank(sigma2)))
     kept, angle = convert(parts, Form.SERIES), np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
     found = {}
@@ -177,7 +180,10 @@ def expansion_errors(sigma2: float) -> dict[str, FloatArray]:
 
 
 def recurrence(equation: SliderEquation, mean: float) -> tuple[FloatArray, FloatArray]:
-    """Return A and B of (4.33) by (4.34), (4.35), with ``mean`` for lambda_c; without a damper this is (4.32)."""
+    """Return the matrix A and the right side B of (4.33) by (4.34) and (4.35), with ``mean`` in place of lambda_c.
+
+    Without a damper this is (4.32).
+    """
     s = equation.spring_factor
     d = equation.damping_factor
     k = equation.stiffness.to_order(2)
@@ -198,7 +204,10 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[FloatArray, Float
 
 
 def balance_error(omega_c: float, as_printed: bool = True) -> float:
-    """Return (4.34)'s greatest relative error against the balance of (4.29), as printed or with lambda_c k0 for lambda_c."""
+    """Return the greatest relative error of the solution of (4.34), compared with the balance of (4.29), at `BALANCED_AT`.
+
+    If ``as_printed`` is False, (4.34) has lambda_c k0 in place of lambda_c.
+    """
     errors = []
     for speed, ratio in BALANCED_AT:
         equation = slider_equation(chapter_4(ratio, omega_c), speed, variant=Variant.PRINTED, form=Form.SERIES)
@@ -235,7 +244,10 @@ def compute() -> StudyResult:
 
 
 def peaks(omega_c: float) -> tuple[float, float]:
-    """Return the first harmonic over l4 at the linear equation's peak, at I4 = 1, by this equation and by the mechanism."""
+    """Return the first harmonic at the peak of the right linear equation with a damper (1/s) at I4 = 1, relative to l4.
+
+    The first value is that of the linear equation, the second that of the mechanism at the same speed.
+    """
     (speed, linear), mechanism = peak(1, 1.0, omega_c), chapter_4(1.0, omega_c)
     return linear, nonlinear_harmonic_balance(mechanism, speed).harmonic(1) / mechanism.rocker_length
 
@@ -396,7 +408,10 @@ def _balance() -> Iterator[Statement]:
 
 
 def _first_order_series(parts: Coefficients) -> tuple[FourierSeries, ...]:
-    """Return M, K and F, with one harmonic, as quotients to first order of the thesis's coefficients by the spring's."""
+    """Return the series of M, K and F: the thesis's coefficients of inertia, stiffness and force, divided by the spring's.
+
+    The quotients are taken to first order and have one harmonic.
+    """
     return tuple(
         FourierSeries(np.array([mean, c]), np.array([0.0, s]))
         for mean, c, s in (

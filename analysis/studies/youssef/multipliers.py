@@ -68,7 +68,10 @@ def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) 
 
 
 def chapter_2_residuals() -> dict[str, float]:
-    """Return each equation's greatest residual over its greatest term, (2.11) to (2.21), at constant speed and by torque."""
+    """Return the greatest residual of each equation (2.11) to (2.21) in motions of the plant, relative to its greatest term.
+
+    The crank turns at constant speed, and then under a torque.
+    """
     p, worst, load = FULL.constants(), dict[str, float](), LOAD * np.exp(-1j * FULL.ground_inclination)
     for drive, th in ((drive, th) for drive in (1.0, 0.0) for th in np.linspace(0.0, 6.0, 25).tolist()):
         u, w, v = 0.01 * cos(2.0 * th), OMEGA, 0.3 * sin(th + 1.0)

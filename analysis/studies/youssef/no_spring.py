@@ -68,7 +68,10 @@ class Drift:
 
     @property
     def _ends(self) -> tuple[NDArray[np.int64], FloatArray]:
-        """Return the numbers of the turns after the transient, or all if none follows, and u (cm) at the end of each."""
+        """Return the numbers of the turns after the transient, and the slider position (cm) at the end of each.
+
+        If no turn follows the transient, all turns are used, from number 0.
+        """
         last = self._last
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
         return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
@@ -91,7 +94,10 @@ class Drift:
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
-        """Return the greatest change from a turn to the next, without mean drifts, relative to the range of the next."""
+        """Return the greatest change of the motion from turn ``number`` to the next, relative to the range of the next turn.
+
+        The mean drift of each turn is subtracted first; the change is the range of the difference of the two turns.
+        """
         share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
         one, other = (u - share * (u[-1] - u[0]) for u in map(self.turn, (number, number + 1)))
         return float(np.ptp(other - one) / np.ptp(other))
@@ -103,14 +109,20 @@ class Drift:
 
     @property
     def transient(self) -> float:
-        """Return the number of turns before one is like the next; if none is, those until collinear, or `DRAWN_TURNS`."""
+        """Return the number of turns before the first turn that is like the next one.
+
+        If the motion never becomes steady, return the turn at which the links become collinear, or else `DRAWN_TURNS`.
+        """
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
         return next((n - 1 for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Simulate Table 3.1 at 420 rpm without a spring, for `DRIFT_TURNS` turns or to the limit of assembly."""
+    """Simulate the mechanism of Table 3.1 at 420 rpm without a spring, up to `DRIFT_TURNS` turns or the limit of assembly.
+
+    The links count as collinear where the sine of the transmission angle falls below `COLLINEAR_SINE`.
+    """
     angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -226,7 +238,10 @@ def weightless_result() -> StudyResult:
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Draw the drift over few and many turns, a cross where the links become collinear, dashed without gravity."""
+    """Draw the drift over the first turns and over many turns.
+
+    A cross marks where the links become collinear; dashed curves are without gravity.
+    """
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):

@@ -35,7 +35,10 @@ class Part(NamedTuple):
 
 
 def straightest(curve: FloatArray) -> Part:
-    """Return the straightest part of a closed curve (m), within 120 deg of the crank and at least as long as the travel AB."""
+    """Return the part of a closed curve of N points (m) with the least flatness error per length.
+
+    The parts compared lie within 120 degrees of crank rotation and are at least as long as the travel AB, along the line.
+    """
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
     laid = np.vstack([curve, curve[:greatest]])
     parts = (

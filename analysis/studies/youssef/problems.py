@@ -102,7 +102,10 @@ class PublishedProblem:
 
 
 def ellipse(semi_axis_cm: float, n: int) -> FloatArray:
-    """Return n points (m), shape (n, 2), of the ellipse about (20, 15) cm with this semi-axis along x and 5 cm along y."""
+    """Return n points of the target ellipse about (20, 15) cm, shape (n, 2) in m.
+
+    The semi-axis along x is given in cm, the semi-axis along y is 5 cm.
+    """
     phi = syn.turn(n)
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 

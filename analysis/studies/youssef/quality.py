@@ -95,7 +95,10 @@ def least_combined(start: Linkage) -> Linkage:
 
 
 def descent_ratio(name: str) -> float:
-    """Return the printed linkage's error over that at the end of a descent; rocker functions are taken as in `AS_FOUND`."""
+    """Return the error of the printed linkage, relative to the error at the end of a descent from it.
+
+    A rocker function is taken as in `AS_FOUND`.
+    """
     p, longest = AS_FOUND.get(name, PROBLEMS[name]), PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
     bounds = {**dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)), **p.bounds}
@@ -112,7 +115,11 @@ def descent_ratio(name: str) -> float:
 
 @cache
 def linkages() -> dict[str, Linkage]:
-    """Return by name the printed linkages for the timed ellipse and the path, and ours for each and for both together."""
+    """Return the linkages compared, by name.
+
+    They are the printed linkages for the timed ellipse and for the path, and our linkages for the timed ellipse, for the path
+    and for the sum of both quality functions.
+    """
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
     ours = {"ours; timed": timed, "ours; path": with_best_phase(best("path-a").linkage)}
@@ -195,7 +202,10 @@ def judge_qualities(timed: Quality, path: Quality, found: Quality) -> Iterator[S
 
 
 def share_of_values(found: FloatArray) -> float:
-    """Return how many values (6.12) needs at 0 and 180 deg only, over those at all angles, each test until one is negative."""
+    """Return the number of values of (6.12) in a test at 0 and 180 deg only, divided by the number in a test at all angles.
+
+    ``found`` has the values of random four-bars at all angles; the test of each stops at the first negative value.
+    """
     at_two, at_all = (
         np.where(bad.any(axis=1), bad.argmax(axis=1) + 1, bad.shape[1]).sum()
         for bad in (found[:, [0, 36]] < 0.0, found < 0.0)

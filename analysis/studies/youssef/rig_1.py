@@ -103,7 +103,10 @@ def compute_rig_1() -> StudyResult:
 
 
 def accommodated_amplitude(spring: str) -> tuple[float, float]:
-    """Return speed (rpm) and size (cm) of the greatest amplitude, every 5 rpm, below that at which the guide was too short."""
+    """Return the speed (rpm) and the size (cm) of the greatest amplitude below the speed at which the guide was too short.
+
+    The speeds begin with the lowest of the figures, in steps of 5 rpm.
+    """
     speeds = np.arange(FIRST[spring], float(STOPPED[spring]), 5.0).tolist()
     size, at = max((amplitude(turn(spring, w)), w) for w in speeds)
     return at, size
@@ -160,7 +163,12 @@ def amplitude_decrease(coefficient: float) -> FloatArray:
 
 
 def spread_beyond_constant(coefficient: float) -> float:
-    """Return the ratio of the greatest to the least decrease by friction, over that by constant friction of the same mean."""
+    """Return the variation of the amplitude's decrease with the speed, relative to constant friction.
+
+    The variation is the greatest decrease divided by the least, with spring A at the speeds `COMPARED`; the result is the
+    variation with friction by a coefficient, divided by the variation with constant friction. The constant friction
+    is the coefficient times the mean of the guide's force over these turns without friction.
+    """
     constant = coefficient * float(np.mean([np.abs(turn("A", w)["slider.guide_force"]).mean() for w in COMPARED["A"]]))
     even = [amplitude(turn("A", w)) - amplitude(turn("A", w, slider_coulomb_friction=constant)) for w in COMPARED["A"]]
     varying = amplitude_decrease(coefficient)
@@ -199,7 +207,10 @@ def friction_force_ratios(speed: float, coefficient: float) -> FloatArray:
 
 
 def difference_from_constant(speed: float, coefficient: float) -> float:
-    """Return u's greatest difference from u with constant friction of the same mean, over the smooth amplitude; spring A."""
+    """Return the greatest difference of u with friction by a coefficient from u with constant friction, with spring A.
+
+    The constant friction is the mean over a turn without friction. The result is relative to the amplitude without friction.
+    """
     mean = coefficient * float(np.abs(turn("A", speed)["slider.guide_force"]).mean())
     varying, even = (
         slider(turn("A", speed, **{name: value}))

@@ -46,7 +46,10 @@ WIDTH = (
 
 
 def _unbalance_ratio(spring: str, speeds: FloatArray, unbalance: float) -> float:
-    """Return the amplitude over that of a single mass under an unbalance (cm.kg), at the speed where it is farthest from 1."""
+    """Return the ratio of the amplitude to the amplitude of a single mass under an unbalance (cm.kg).
+
+    The single mass is on the same spring and damper. Of the ratios at the speeds (rpm) the one farthest from 1 is returned.
+    """
     rates = RAD_S_PER_RPM * speeds
     amplitudes = np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()])
     ratios = amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)
@@ -199,7 +202,10 @@ def compute_resonance(spring: str) -> StudyResult:
 
 @cache
 def width(spring: str, linear: Variant | None = None, /, **changes: float) -> float:
-    """Return the width of the resonance (rpm), see `WIDTH`, by the full equations, with changes, or by a linear equation."""
+    """Return the width of the resonance (rpm), defined in `WIDTH`.
+
+    It follows from the full equations, with changes of the rig, or from the variant ``linear`` of the linear equation.
+    """
     speeds = rigs.natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
         sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
@@ -375,7 +381,10 @@ HARMONICS = (1, 2, 3)
 
 
 def _greatest(spring: str, n: int, part: int, order: Variant) -> float:
-    """Return the linear equation's greatest n-th harmonic over l4 near the natural frequency divided by ``part``."""
+    """Return the greatest amplitude of the n-th harmonic of the linear equation, relative to l4.
+
+    It is sought near the natural frequency divided by ``part``.
+    """
     place = rigs.natural_speed(spring) / part
     found = minimize_scalar(
         lambda speed: -linear_motion(spring, float(speed), order).harmonic(n),

@@ -119,7 +119,10 @@ def slider(motion: Turn) -> FloatArray:
 
 
 def complex_stiffness(p: FiveBarParameters, rates: FloatArray) -> NDArray[np.complex128]:
-    """Return force over displacement (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
+    """Return the complex dynamic stiffness (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s).
+
+    It is the force divided by the displacement.
+    """
     return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
@@ -170,7 +173,10 @@ def maximum_near_fraction(spring: str, order: int) -> tuple[float, float]:
 
 
 def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
-    """Return the speeds (rpm) of the maximum near half the natural frequency, for a stiffness (N/m), and the next minimum."""
+    """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the minimum that follows.
+
+    ``stiffness`` is the spring's stiffness (N/m).
+    """
     place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
     found = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
     top, _ = only_extremum(found.maxima(), 0.9 * place, 1.1 * place)
@@ -178,7 +184,10 @@ def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
 
 
 def peak_rise(spring: str, order: int) -> float:
-    """Return the maximum near 1/order of the natural frequency over the next minimum, minus 1; 0 if there is none."""
+    """Return the amplitude's maximum near 1/order of the natural frequency divided by the minimum that follows, minus 1.
+
+    The result is 0 without such a maximum.
+    """
     place = natural_speed(spring) / order
     found = response(spring, 0.9 * place, 1.25 * place, COARSE)
     tops = [e for e in found.maxima() if e.parameter < 1.1 * place * RAD_S_PER_RPM]
@@ -199,7 +208,10 @@ def friction_amplitudes(spring: str, coefficient: float) -> FloatArray:
 
 
 def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> FloatArray:
-    """Return the amplitude (cm) at each speed (rpm) with changes of the rig, found from the motion at the speed before."""
+    """Return the amplitude (cm) at each speed (rpm) with changes of the rig.
+
+    Each motion is found from the motion at the previous speed.
+    """
     parameters, start, found = rig(spring, **changes), orbit(rig(spring), speeds[0]).start, []
     for speed in speeds:
         motion = orbit(parameters, speed, start)
@@ -209,7 +221,10 @@ def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> 
 
 
 def branch_columns(branch: Branch, name: str) -> dict[str, FloatArray]:
-    """Return the amplitude along a branch as columns for `curves_over_speed`, its stable and unstable parts apart."""
+    """Return the amplitude along a branch as columns, with stable and unstable parts in separate columns.
+
+    `curves_over_speed` turns these columns into curves.
+    """
     amplitude = CM_PER_METRE * branch.amplitude
     stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])
     # a dashed part begins and ends on the solid one

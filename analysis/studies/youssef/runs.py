@@ -38,7 +38,10 @@ SETTLING_TIME = 8.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
-    """Return Table 3.1 with a spring (dyn/cm), damper (dyn.s/cm) and gravity (m/s2), then with the reader's changes."""
+    """Return the parameters of Table 3.1 with this spring (dyn/cm), damper (dyn.s/cm) and gravity (m/s2).
+
+    The reader's changes are applied last.
+    """
     return vary(
         replace(
             TABLE_3_1,
@@ -103,7 +106,10 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
 
 
 def least(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Return abscissa and value of the minimum of even samples, by a parabola through the lowest and its neighbours."""
+    """Return abscissa and value of the minimum of evenly spaced samples, by a parabola.
+
+    The parabola passes through the lowest sample and the samples beside it.
+    """
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1 : i + 2]
     shift = 0.5 * (a - c) / (a - 2.0 * b + c)

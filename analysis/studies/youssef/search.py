@@ -70,13 +70,14 @@ class Found(NamedTuple):
     evaluations: int
 
 
-def close(v: FloatArray, n: int) -> Iterator[tuple[NDArray[np.complex128], FloatArray]]:
+def both_closures(v: FloatArray, n: int) -> Iterator[tuple[NDArray[np.complex128], FloatArray]]:
     """Yield, for each of the two closures, the crank pin B (cm) and the coupler's angle (rad) at n crank angles."""
     l1, l2, l3, l4 = v[2:6]
     pin = l2 * np.exp(1j * (turn(n) + v[8]))
     reach = np.abs(l1 - pin)
     turned = np.arccos(np.clip((l3**2 + reach**2 - l4**2) / (2.0 * l3 * reach), -1.0, 1.0))
-    yield from ((pin, np.angle(l1 - pin) + side * turned) for side in (1.0, -1.0))
+    for side in (1.0, -1.0):
+        yield pin, np.angle(l1 - pin) + side * turned
 
 
 def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[FloatArray, FloatArray]:
@@ -85,9 +86,10 @@ def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[Float
     A closure is one of the two ways in which the links can be joined at every crank angle. ``v`` are the parameters in the
     order of `LOW`; ``semi_axis`` is the ellipse's semi-axis along x (cm), by default that of ellipse (a).
     """
-    x0, y0, *_, r, a1, _, a2 = v
+    x0, y0 = v[:2]
+    r, a1, _, a2 = v[6:]
     target = CM_PER_METRE * ellipse(semi_axis, n) @ np.array([1.0, 1j])
-    points = (pin + r * np.exp(1j * (coupler + a2)) for pin, coupler in close(v, n))
+    points = (pin + r * np.exp(1j * (coupler + a2)) for pin, coupler in both_closures(v, n))
     first, second = (x0 + 1j * y0 + np.exp(1j * a1) * p - target for p in points)
     return np.concatenate([first.real, first.imag]), np.concatenate([second.real, second.imag])
 
@@ -187,7 +189,11 @@ def searches() -> dict[str, tuple[Found, ...]]:
 
 @cache
 def run_ranked() -> tuple[tuple[Found, ...], ...]:
-    """Run the searches compared by rank: from random sets; with 12 points, five, nine parameters, 36 points first."""
+    """Run the searches that are compared by rank, and return the results of each kind.
+
+    The kinds are: from random sets; with 12 points first; with five parameters first; with nine parameters first; with 36
+    points first.
+    """
     random = np.random.default_rng(62)
     plain = tuple(downhill(error, starting_sets(random, [])) for _ in range(RANKED))
     points, five = zip(*((_points_first(random), _parameters_first(random)) for _ in range(RANKED)))
@@ -196,11 +202,15 @@ def run_ranked() -> tuple[tuple[Found, ...], ...]:
 
 
 def rocker_error(v: FloatArray) -> float:
-    """Return the error (deg2) of the rocker function of Fig 6.7 at N crank angles, by the better of the two closures."""
+    """Return the error (deg2) of the rocker function of Fig 6.7: the sum of squares at N crank angles.
+
+    The links can be joined in two ways; the error is that of the better way, the same at all crank angles.
+    """
+    l1, _, l3, _ = v[2:6]
     wanted, errors = rocker_angle_deg(turn(N)), []
-    for pin, coupler in close(v, N):
-        joint = pin + v[4] * np.exp(1j * coupler)
-        off = (np.degrees(np.angle(joint - v[2])) - wanted + 180.0) % 360.0 - 180.0
+    for pin, coupler in both_closures(v, N):
+        joint = pin + l3 * np.exp(1j * coupler)
+        off = (np.degrees(np.angle(joint - l1)) - wanted + 180.0) % 360.0 - 180.0
         errors.append(float(off @ off))
     return min(errors)
 
@@ -217,7 +227,10 @@ def _parameters_first(random: np.random.Generator, free: list[int] = FEWER) -> F
 
 
 def _second_search(first: Found, share: float, random: np.random.Generator) -> Found:
-    """Search again from the end of a first search, each evaluation of which counts as ``share`` evaluations."""
+    """Search again from the end of a first search, and add the evaluations of the first search.
+
+    Each evaluation of the first search counts as ``share`` evaluations.
+    """
     then = downhill(error, starting_sets(random, [first.parameters]))
     return then._replace(evaluations=then.evaluations + round(share * first.evaluations))
 
@@ -270,7 +283,10 @@ def compute() -> StudyResult:
 
 
 def reaches_best(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: bool) -> NDArray[np.bool_]:
-    """Return which searches reach the best end of ``plain``, if ``quickly`` with no more evaluations than its median."""
+    """Return for each search whether it reaches the best end of the searches ``plain`` from random sets.
+
+    With ``quickly`` it must also take no more evaluations than the median of ``plain``.
+    """
     best = min(end.error for end in plain)
     usual = np.median([end.evaluations for end in plain]) if quickly else np.inf
     return np.array([end.error <= (1.0 + SMALL) * best and end.evaluations <= usual for end in ends])

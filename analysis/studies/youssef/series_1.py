@@ -74,7 +74,12 @@ def squared_errors(found: Solution) -> tuple[float, float]:
 
 
 def all_terms_excess(curves: int = 20, seed: int = 11) -> float:
-    """Return the greatest excess of the best series' squared error over the variational one, see L5768, for random curves."""
+    """Return the greatest value of e_F / e_V - 1 over random desired curves.
+
+    e_F and e_V are the sums of squared errors of a Fourier series and of the variational motion. The series has as many terms
+    as there are points and interpolates the variational motion. The desired curves are points scattered about random positions
+    of P.
+    """
     # off the axis, where the slider can come below the crank pin and the links then have no direction
     random, steps, found = np.random.default_rng(seed), turn(73), []
     rotation = steps + 0.02
@@ -100,7 +105,10 @@ def vertical_tangents() -> list[float]:
 
 
 def solve_slider_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return U, shape (n, 2), by both signs of (7.14), or by (7.15) where it has no real root, and a mask of these points."""
+    """Solve eq (7.14) for U with both signs of its square root, or (7.15) where (7.14) has no real root.
+
+    Returns U, shape (n, 2), and a mask of the points where (7.15) is used.
+    """
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     first, square = pointing_positions(rotation, target)
     upright = square < 0.0
@@ -151,7 +159,10 @@ def draw_wanted(result: StudyResult) -> Figure:
 
 
 def least_distance(rotation: float, target: complex) -> tuple[float, float]:
-    """Return P's least distance from a target over `POSITIONS` and assemblies, and how far P moves from one to the next."""
+    """Return the least distance of P from a target at a crank rotation, over the slider `POSITIONS` and both assemblies.
+
+    The second result is the distance that P moves from this nearest point to the adjacent slider position.
+    """
     crank, found = np.full(POSITIONS.size, rotation), []
     for branch in (1, -1):
         path = replace(LINKAGE, branch=branch).path(crank, (POSITIONS, np.zeros_like(POSITIONS))) @ np.array([1.0, 1j])
@@ -396,7 +407,10 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
 
 
 class Motions(NamedTuple):
-    """Figure of slider motions: claim, motions, drawn quantity, statements (or the figure to ``see`` for them), assignment."""
+    """Figure of slider motions: its claim, the motions, the drawn quantity, the statements, and our choices.
+
+    ``see`` is the number of the figure that judges the statements, if they are not given here.
+    """
 
     claim: str
     names: tuple[str, ...]

@@ -144,7 +144,10 @@ def angle_error(linkage: Linkage) -> FloatArray:
 
 @cache
 def error_ratios() -> Mapping[str, float]:
-    """Return, for the printed linkages, the error with two harmonics of the slider over that with a fixed pivot."""
+    """Return the error with two harmonics of the slider divided by that with a fixed pivot, for each problem of chapter VI.
+
+    The linkages are the printed ones.
+    """
     tasks = {
         name: UntimedPath(path=packaging_path()) if name == "packaging" else p.task for name, p in PROBLEMS.items()
     }
@@ -294,7 +297,10 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def out_of_reach(quarter: int = 20000) -> float:
-    """Return the ellipse's area (cm2) beyond l2 + r from the crank shaft, by polygons with ``quarter`` sides a quadrant."""
+    """Return the area (cm2) of the ellipse's part that lies beyond l2 + r from the crank shaft.
+
+    Ellipse and circle of this radius are approximated by polygons with ``quarter`` sides in each quadrant.
+    """
     from shapely import Point, Polygon
 
     p = PROBLEMS[PATH]
@@ -315,7 +321,10 @@ def shares_of_stated() -> dict[str, float]:
 
 
 def error_range(name: str, found: Linkage) -> tuple[float, float]:
-    """Return least and greatest error of the linkage ``found`` with a printed series over the rounding of its numbers."""
+    """Return the least and the greatest error with a printed series over the rounding of the printed numbers.
+
+    ``found`` is the linkage with this series.
+    """
     motion, (mean, guide) = slider(found), HALF_UNITS[name]
     off = np.concatenate(
         [half_units(found), np.array([mean, *[0.0005] * 4]) / CM_PER_METRE, [radians(guide)]], dtype=float

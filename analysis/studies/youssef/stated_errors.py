@@ -39,7 +39,10 @@ def share_of_stated(name: str) -> float:
 
 
 def errors_by_reading(name: str, linkage: Linkage) -> dict[str, float]:
-    """Return a linkage's error (unit of print) by each reading of the text; only rocker functions have several."""
+    """Return the error of a linkage (unit of print) for each reading of the text.
+
+    Only the rocker functions have more than one reading.
+    """
     if not isinstance(PROBLEMS[name].task, RockerFunction):
         return {"": PROBLEMS[name].linkage_error(linkage)}
     found: dict[str, float] = {}
@@ -70,7 +73,10 @@ def half_units(linkage: Linkage) -> FloatArray:
 
 
 def rounding_range(name: str) -> tuple[str, float, float]:
-    """Return the reading nearest to the stated error, and the least and greatest error that the digits' rounding allows."""
+    """Return the reading that comes nearest to the stated error, and the least and the greatest error that it allows.
+
+    The readings are those of `errors_by_reading`. Each printed dimension may be off by up to half a unit of its last digit.
+    """
     p = PROBLEMS[name]
     assert p.error is not None
     off, stated = half_units(p.linkage), p.error

@@ -190,8 +190,9 @@ class _ObjectiveAndRange:
     end: float | str | None = entry(_end, None)
 
     def _range(self) -> dict[str, Any]:
-        usual = {"n": 72, "start": 0.0, "end": tau}
-        return {name: usual[name] if (own := getattr(self, name)) is None else own for name in usual}
+        usual: dict[str, Any] = {"n": 72, "start": 0.0, "end": tau}
+        own = {name: getattr(self, name) for name in usual}
+        return usual | {name: value for name, value in own.items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -278,7 +279,7 @@ class TimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
-    """The table ``[task]`` of an `tasks.UntimedPath`.
+    """The table ``[task]`` of a `tasks.UntimedPath`.
 
     Attributes
     ----------

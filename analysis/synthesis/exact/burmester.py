@@ -217,11 +217,11 @@ def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
 
 
 def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the four dyads of five poses, including complex ones, in units of the poses' size.
+    """Compute the four dyads of five poses, including complex ones; all lengths are in units of the poses' size.
 
-    ``p`` are the positions of the body's reference point as complex numbers, ``angle`` its angles (rad), shape (5,). The result
-    is z and m, shape (4, 2): Cartesian coordinates of point and pivot of each dyad, relative to the first position; real for a
-    dyad that can be built.
+    ``p`` are the positions of the body's reference point relative to the first one, as complex numbers; ``angle`` are the
+    body's angles (rad); both have the shape (5,). The results z and m, each of shape (4, 2), are the Cartesian coordinates of
+    the point and the pivot of each dyad, relative to the first position. They are real for a dyad that can be built.
 
     Raises InputError if the conditions of the poses are not independent.
     """

@@ -53,10 +53,19 @@ def link_mass_properties(
 ) -> dict[str, Any]:
     """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
 
-    Crank, coupler and rocker have the lengths l2, l3, l4; r and a2 are distance and direction of the coupler point (m, rad). A
-    bar has the mass ``line`` per length (kg/m) and the width ``width`` (m). Crank and rocker are bars between their pins. The
-    coupler consists of two bars, B to C and B to P; if P is on the line of B and C (``straight``), it is one bar over the whole
-    length.
+    Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
+    and C (``straight``), it is one bar over the whole length.
+
+    Parameters
+    ----------
+    l2, l3, l4, r, a2 : float
+        Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
+    line : float
+        Mass of a bar per length (kg/m).
+    width : float
+        Width of a bar (m).
+    straight : bool
+        Whether P is on the line of B and C.
     """
     m2, i2 = bar_mass_properties(l2, line, width)
     m4, i4 = bar_mass_properties(l4, line, width)
@@ -310,10 +319,19 @@ def pin_functions(
 ) -> dict[str, tuple[Any, Any]]:
     """Return the components of each pin's force along and across the ground link (N), by pin, for CasADi symbols or numbers.
 
-    ``d`` has dimensions and branch by their names in `Linkage`; ``crank_angle`` is a CasADi column of angles th2 (rad).
-    ``straight`` says whether the coupler point is on the line of B and C, see `link_mass_properties`; ``linkage`` is the type
-    of the linkage. For a slider-crank the force at D is the force of the guide on the slider; ``on_slider`` says whether the
-    coupler point is its pin C, so that the slider carries the load.
+    Parameters
+    ----------
+    d : namespace
+        Dimensions and branch, by their names in `Linkage`.
+    make : MachineSpec
+    crank_angle : CasADi column
+        th2, one or more angles (rad).
+    straight : bool
+        Whether the coupler point is on the line of B and C, see `link_mass_properties`.
+    linkage : type
+        Type of the linkage; for a slider-crank the force at D is the force of the guide on the slider.
+    on_slider : bool
+        Whether the coupler point is the pin C of a slider-crank, whose slider then carries the load.
     """
     casadi = symbolic.library()
     kind, plant, law = _trace_plant()
