@@ -392,7 +392,8 @@ class Normal:
     unit: float  # size of the target (m): diagonal of its bounding box; for a rocker function 1 m
     points: NDArray[np.complex128] | None = None  # target of the coupler point, shape (n,)
     angle: FloatArray | None = None  # target of the coupler's or the rocker's angle (rad), shape (n,)
-    of_rocker: bool = False  # whether `angle` is the rocker's, from the ground link; else the coupler's
+    # whether `angle` is the rocker's, relative to the ground link; otherwise it is the coupler's, in the plane
+    of_rocker: bool = False
     of_slider: bool = False  # whether the points are positions of a slider
     mounting: bool = False  # whether the output angle is free
     leverage: float = 1.0  # factor of an angular error (units per rad); 1 for a rocker function
