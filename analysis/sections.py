@@ -102,7 +102,12 @@ class Rod(_Profile):
 class Tube(_Profile):
     """A round tube: moment of inertia m (3 (ro^2 + ri^2) + L^2)/12.
 
-    ``outer`` and ``inner`` are its diameters (m), the inner one less; ``density`` is in kg/m3, or the name of a material.
+    Attributes
+    ----------
+    outer, inner : float
+        Diameters (m); the inner one must be less.
+    density : float
+        Density (kg/m3), or the name of a material.
     """
 
     outer: Amount
@@ -125,8 +130,12 @@ class Tube(_Profile):
 class Bar(_Profile):
     """A rectangular bar: moment of inertia m (L^2 + w^2)/12 about an axis normal to the plane of motion.
 
-    ``width`` is in the plane of motion, ``thickness`` normal to that plane (m); ``density`` is in kg/m3, or the name of a
-    material.
+    Attributes
+    ----------
+    width, thickness : float
+        Width in the plane of motion, and thickness normal to that plane (m).
+    density : float
+        Density (kg/m3), or the name of a material.
     """
 
     width: Amount
@@ -160,13 +169,20 @@ class Plate(_Section):
     density: Amount
 
     def properties(self, points: ArrayLike) -> MassProperties:
-        """Return mass, centre of mass and moment of inertia of a plate with the given corners (m), shape (n, 2), n >= 3.
+        """Return mass, centre of mass and moment of inertia of a plate with the given corners.
 
-        The corners are in order, clockwise or counter-clockwise, without repeating the first. By Green's theorem the integrals
-        over the area become sums over the edges: C. Steger, On the calculation of arbitrary moments of polygons, report
-        FGBV-96-05, TU Munich, 1996.
+        By Green's theorem the integrals over the area become sums over the edges: C. Steger, On the calculation of arbitrary
+        moments of polygons, report FGBV-96-05, TU Munich, 1996.
 
-        Raises ParameterError if there are fewer than three corners, they enclose no area, or edges cross.
+        Parameters
+        ----------
+        points : array_like
+            Corners (m) in order, clockwise or counter-clockwise, without repeating the first, shape (n, 2), n >= 3.
+
+        Raises
+        ------
+        ParameterError
+            If there are fewer than three corners, they enclose no area, or edges cross.
         """
         corners = np.asarray(points, dtype=float)
         if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.all(np.isfinite(corners)):

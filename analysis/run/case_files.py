@@ -294,7 +294,10 @@ def _case_file_name(name: str, mechanism: Mechanism) -> str:
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput]
 ) -> dict[str, Any]:
-    """Return the tables of a case without the rival drives, or ends of the run, that an override replaces."""
+    """Return the tables of a case without the entries that an override replaces.
+
+    These entries are drives of the same degree of freedom, or entries that set the end of the run.
+    """
     result = dict(data)
     for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
         if given in overrides and isinstance(run := result.get("run"), Mapping):
@@ -398,8 +401,12 @@ def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
     The values of a signal have the unit ``unit``; the file of a table is read from ``folder``.
     """
     value, values = Quantity(unit), Many(Quantity(unit))
-    waves: dict[str, Reader] = {"mean": value, "amplitudes": values}
-    waves |= {"frequencies": Many(Quantity("rad/s")), "phases": Many(Quantity("rad"))}
+    waves: dict[str, Reader] = {
+        "mean": value,
+        "amplitudes": values,
+        "frequencies": Many(Quantity("rad/s")),
+        "phases": Many(Quantity("rad")),
+    }
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),
         "table": Table(

@@ -185,7 +185,10 @@ class _Stepwise:
         return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
-        """Return the slopes of the inputs over the next step; the state at its end is predicted from the outputs ``row``."""
+        """Return the slopes of the inputs over the next step.
+
+        The outputs ``row`` at the beginning of the step are used to predict the state at its end.
+        """
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
         n, laws = len(self.rates), self.laws.copy()
@@ -370,8 +373,16 @@ def output_scales(largest: Mapping[str, float], units: Mapping[str, str]) -> dic
         return max((size for n, size in largest.items() if units[n] == unit and n not in residuals), default=0.0)
 
     lengths, speed = like("m"), next((size for n, size in largest.items() if units[n] == "rad/s"), 0.0)
-    floors = {"N": like("N"), "N.m": like("N") * lengths, "J": like("J"), "rad/s": speed, "rad/s2": speed**2}
-    floors |= {"m": lengths, "m/s": lengths * speed, "m/s2": lengths * speed**2}
+    floors = {
+        "m": lengths,
+        "m/s": lengths * speed,
+        "m/s2": lengths * speed**2,
+        "rad/s": speed,
+        "rad/s2": speed**2,
+        "N": like("N"),
+        "N.m": like("N") * lengths,
+        "J": like("J"),
+    }
     # the size of a residual's terms; without energies among the outputs, a torque is of the same dimension
     terms = {"m": lengths, "J": like("J") or like("N.m") or 1.0}
 

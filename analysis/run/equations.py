@@ -193,7 +193,12 @@ def run_functions(mechanism: Mechanism, switched: bool = False) -> list[Any]:
 class Machine:
     """Machine code of a mechanism's equations.
 
-    ``addresses`` are those of the functions, with the indices DERIVATIVE to JUMP; ``fingerprint`` is a hash of the code.
+    Attributes
+    ----------
+    addresses : ndarray of int64
+        Addresses of the functions, with the indices DERIVATIVE to JUMP.
+    fingerprint : str
+        Hash of the code.
     """
 
     def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:

@@ -38,8 +38,17 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
     """An FMU in model exchange with its inputs, integrated by CVode.
 
     Between jumps the inputs, commanded rates and their derivatives included, are continuous functions of time and state. At a
-    jump the FMU goes through event mode. ``encoded`` are the inputs, ``times`` those of the samples (s). ``tolerance`` is
-    CVode's relative tolerance; the absolute tolerance of a state is this times the nominal value of the state.
+    jump the FMU goes through event mode.
+
+    Parameters
+    ----------
+    model : FmuModel
+    encoded : Encoded
+        The inputs.
+    times : ndarray
+        Times of the samples (s).
+    tolerance : float
+        CVode's relative tolerance; the absolute tolerance of a state is this times the nominal value of the state.
     """
 
     def __init__(self, model: FmuModel, encoded: Encoded, times: NDArray[np.float64], tolerance: float) -> None:

@@ -72,9 +72,19 @@ def unpacking_folder() -> str:
 class Experiment:
     """An experiment of an FMU; an attribute that the file does not give is None or empty.
 
-    ``start``, ``stop`` and ``step`` are times (s), ``tolerance`` is the relative tolerance of the solver, and ``allowed`` the
-    largest relative difference from the reference that the FMU allows. ``parameters`` are values by name, as texts. ``stimuli``
-    and ``reference``, the reference results, have a column of times (s), then a column for each variable by its name.
+    Attributes
+    ----------
+    name, description : str
+    start, stop, step : float or None
+        Times (s).
+    tolerance : float or None
+        Relative tolerance of the solver.
+    allowed : float or None
+        Largest relative difference from the reference that the FMU allows.
+    parameters : mapping
+        Values of parameters by name, as texts.
+    stimuli, reference : structured ndarray or None
+        Inputs and reference results: a column of times (s), then a column for each variable by its name.
     """
 
     name: str

@@ -88,9 +88,23 @@ def list_interfaces(fmu: str | Path) -> dict[str, str]:
 class _Instance:
     """An initialised instance of an FMU of Linkwork, run by FMPy. Use it as a context manager.
 
-    The FMU must be of the mechanism to which the parameters belong; the file determines the version of FMI. ``modes`` are the
-    values of the mechanism's modes, ``inputs`` those of the inputs at the start, both by name. CosimulationError is raised if
-    the file is not such an FMU, or its initialisation fails.
+    The FMU must be of the mechanism to which the parameters belong; the file determines the version of FMI.
+
+    Parameters
+    ----------
+    fmu : path
+    parameters, initial
+        Parameters and initial state of a mechanism.
+    modes : dict
+        Values of the mechanism's modes, by name.
+    tolerance, start_time : float
+    inputs : dict
+        Inputs at the start, by name.
+
+    Raises
+    ------
+    CosimulationError
+        If the file is not such an FMU, or its initialisation fails.
     """
 
     interface: ClassVar[str]

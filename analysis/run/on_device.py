@@ -51,7 +51,13 @@ def run_thread(i, table):
 
 @cache
 def solver(mechanism: Mechanism, switched: bool) -> device.Cuda:
-    """Return the solver of a mechanism's runs on the graphics processor; raise MissingLibraryError if CuPy is not installed."""
+    """Return the solver of a mechanism's runs on the graphics processor, for `run_on_device`; see `device.Cuda`.
+
+    Raises
+    ------
+    MissingLibraryError
+        If CuPy is not installed.
+    """
     try:
         return device.Cuda(run_thread, run_functions(mechanism, switched))
     except ImportError:

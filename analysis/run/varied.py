@@ -29,8 +29,14 @@ from .inputs import Inputs
 class VariedSequence(Sequence[Any]):
     """A sequence of objects that differ in some fields; each object is made only when it is taken from the sequence.
 
-    ``base`` has the values of the fields that do not differ, ``columns`` those that differ, for all objects by field. The
-    function ``make`` makes an object from ``base`` and the object's own values, as keywords.
+    Attributes
+    ----------
+    base : object
+        Object with the values of the fields that do not differ.
+    columns : dict of str to ndarray
+        Values of the fields that differ, for all objects, by field.
+    make : callable
+        Function that makes an object from ``base`` and the object's own values, as keywords.
     """
 
     def __init__(self, base: Any, columns: dict[str, NDArray[np.float64]], make: Callable[..., Any]) -> None:
@@ -53,11 +59,20 @@ def distinct_objects(items: Sequence[Any]) -> list[Any]:
 
 
 def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tuple[Sequence[Any], Any]:
-    """Return the parameters and the inputs of all sets, which have ``parameters`` and ``inputs`` in common except ``values``.
+    """Return the parameters and the inputs of all sets, which differ in the given values.
 
-    These are values of a parameter or of a constant input, one for each set, in SI or as texts with units; by the FMI name or
-    the name of the field. InputError or ParameterError is raised if a name is unknown, lengths differ, or a value is wrong; the
-    message names the set.
+    Parameters
+    ----------
+    parameters, inputs
+        Values that all sets have in common.
+    values : mapping
+        Values of a parameter or of a constant input, one for each set, in SI or as texts with units; by the FMI name or the
+        name of the field.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If a name is unknown, lengths differ, or a value is wrong; the message names the set.
     """
     mechanism = find_mechanism(parameters)
     if not isinstance(values, Mapping):

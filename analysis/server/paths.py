@@ -35,7 +35,10 @@ _TASK, _EVERY = "linkages.toml", 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Drawn:
-    """Options of both jobs: points of the drawn path (m), whether it is closed, and number of starts of the search."""
+    """Options that the jobs `linkages` and `moved` share.
+
+    They are the points of the drawn path (m), whether it is closed, and the number of starts of the search.
+    """
 
     points: tuple[tuple[float, float], ...] = entry(Many(_POINT, least=3))
     closed: bool = entry(flag, True)

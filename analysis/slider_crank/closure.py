@@ -384,7 +384,10 @@ class Settled:
 
 
 def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
-    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and their joint screws in frame 1, (n, 3, 5)."""
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and the joint screws of the unknowns in frame 1.
+
+    The screws have shape (n, 3, 5).
+    """
     zero = np.zeros_like(th)
     pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
     turned = pin @ about_k(q[:, 0])

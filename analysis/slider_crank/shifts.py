@@ -211,7 +211,10 @@ _PIECES = 1440
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A mechanism whose shift follows a law; the crank's ``speed`` (rad/s) matters only if the shift is over time."""
+    """A mechanism whose shift follows a law over the crank angle.
+
+    ``speed`` is the crank speed (rad/s). It matters only if the shift is a function of time.
+    """
 
     parameters: SliderCrankParameters
     law: ShiftLaw

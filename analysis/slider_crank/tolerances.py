@@ -234,7 +234,10 @@ def instant(turn: ForceTurn, at: Any) -> Instant:
 
 
 def nominal_values(turn: ForceTurn) -> dict[str, float]:
-    """Return the parameters by field name; with a `GrooveShift`, its amplitude and ratio are included."""
+    """Return the parameters by field name.
+
+    If a groove makes the axial shift S1 (`GrooveShift`), its amplitude and ratio are included.
+    """
     values = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     if isinstance(turn.law, GrooveShift):
         values |= {"groove_amplitude": turn.law.amplitude, "groove_ratio": turn.law.ratio}
@@ -270,7 +273,10 @@ def add_errors(
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Return errors at n points by name, as independent dual variables: ``step`` for the one ``moved``, else zero."""
+    """Return errors at n points by name, as independent dual variables.
+
+    The error with the index ``moved`` has the value ``step``, all others are zero.
+    """
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))

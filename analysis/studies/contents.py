@@ -24,6 +24,9 @@ class Entry(NamedTuple):
 
 
 def sentences() -> Mapping[str, list[str]]:
-    """Return the statements that each study judges, shortened and with their places, by the number of the study."""
+    """Return the statements that each study judges, by the number of the study.
+
+    Each statement is shortened and has its place in the thesis.
+    """
     found: dict[str, list[str]] = json.loads(SENTENCES.read_text(encoding="utf-8"))
     return found

@@ -104,7 +104,10 @@ class Case:
 
     @property
     def found(self) -> str:
-        """Return the computed value with unit, to four digits or one more than stated; a rounding error has one digit."""
+        """Return the computed value with unit, to four digits or one more than the stated number; empty if there is none.
+
+        A rounding error, below `ROUNDING_ERROR`, has one digit.
+        """
         if self.computed is None:
             return ""
         digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))

@@ -126,5 +126,8 @@ def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
 
 
 def result_curves(result: StudyResult, x: str, names: Mapping[str, str], **look: Any) -> list[Curve]:
-    """Return columns as curves over the column ``x`` that share ``look``; ``names`` maps column names to labels."""
+    """Return columns of a result as curves over the column ``x``; ``names`` maps the name of each column to its label.
+
+    ``look`` are further attributes that all curves share.
+    """
     return [Curve(x=result.columns[x], y=result.columns[name], label=label, **look) for name, label in names.items()]

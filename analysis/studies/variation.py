@@ -38,7 +38,10 @@ def _current() -> _Variation:
 
 @contextmanager
 def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
-    """Change parameters of all studies computed inside; yield a set that collects their mechanisms' parameter names."""
+    """Apply changes of parameters to all studies computed inside the context.
+
+    Yields a set that collects the parameter names of the mechanisms that these studies build.
+    """
     variation = _Variation(tuple(changes.items()), set())
     token = _CURRENT.set(variation)
     try:

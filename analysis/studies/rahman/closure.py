@@ -123,7 +123,12 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
 
 
 def _independent() -> tuple[int, float]:
-    """Return the rank and the order that the statement on eq 19a lists."""
+    """Return the number of independent equations in 19a, and the order to which the other equations agree with them.
+
+    The number is the rank of the left sides in a general position. Left sides on opposite sides of the diagonal add up to
+    zero, so their right sides should too. The order is the power of the opening (rad, in) with which these sums of right sides
+    decrease as a closed planar loop is opened less and less.
+    """
 
     def odds(q: FloatArray) -> float:
         _, right = _nine_equations(PLANE, AT, q)
@@ -167,14 +172,16 @@ def _settles_with_twist(twist_deg: float) -> bool:
     return bool(case_turn(Case("", 20.0, 0.0, twist_deg)).settled.all())
 
 
+def _settled_shares(a4: float) -> dict[float, float]:
+    """Return the share of `RUNS` runs that settle at every angle, by the shifts of `TRIED`, at an offset a4 (in)."""
+    off = OFF * np.random.default_rng(1991).standard_normal((TRIED.size * RUNS, 5))
+    settled = turn(parameters(a4), np.repeat(TRIED, RUNS), off=off).settled.reshape(-1, RUNS)
+    return dict(zip(TRIED.tolist(), settled.mean(-1).tolist()))
+
+
 def _limits() -> Iterator[Statement]:
     """Judge the limits of S1 and alpha4 that section 3.2 states for the iteration."""
-    # of the runs, the share that settle at every angle, by offset and shift
-    off = OFF * np.random.default_rng(1991).standard_normal((TRIED.size * RUNS, 5))
-    shares = {}
-    for a4 in (0.0, 10.0, 20.0, 30.0):
-        settled = turn(parameters(a4), np.repeat(TRIED, RUNS), off=off).settled.reshape(-1, RUNS)
-        shares[a4] = dict(zip(TRIED.tolist(), settled.mean(-1).tolist()))
+    shares = {a4: _settled_shares(a4) for a4 in (0.0, 10.0, 20.0, 30.0)}
     last = {a4: max(s1 for s1, share in settled.items() if share > 0.0) for a4, settled in shares.items()}
     always = max(s1 for s1 in shares[30.0] if all(share == 1.0 for less, share in shares[30.0].items() if less <= s1))
     within = float(np.mean([_settles_with_twist(twist) for twist in np.linspace(*TWISTS_REACHED_DEG, 7).tolist()]))
@@ -279,7 +286,11 @@ def _mechanism_limits() -> Iterator[Statement]:
 
 
 def _inverse_difference(case: Case) -> float:
-    """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections at the angles of a turn."""
+    """Return the greatest difference of Delta by eq 23a from A^-1 V, over the first corrections of a turn.
+
+    A^-1 is the pseudo-inverse of A that line L457 defines, here computed from singular values. A first correction is one from
+    the solution at the previous angle.
+    """
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     start = np.roll(case_turn(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
     loop = chain(parameters(case.offset_in, case.twist_deg), angle, shift, start)
@@ -393,9 +404,9 @@ def closure() -> StudyResult:
         columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
         columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
         rotation, error, _ = _combined(case)
-        for what, unit, found_there in (("rotation left", "deg", rotation), ("error of S4", "in", error)):
+        for what, unit, values in (("rotation left", "deg", rotation), ("error of S4", "in", error)):
             name = f"{what} with Davidon Fletcher Powell; {case.name} [{unit}]"
-            columns[name] = np.interp(GRID_DEG, GRID_DEG[::2], found_there)
+            columns[name] = np.interp(GRID_DEG, GRID_DEG[::2], values)
     return StudyResult(
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
         assignment=f"The iteration goes round the turn in steps of {STEP_DEG:g} deg. It starts from the planar estimate at "

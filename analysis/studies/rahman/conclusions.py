@@ -24,7 +24,10 @@ def _design() -> Iterator[Statement]:
     printed = planar_forces(erratum_5=False, erratum_6=False)
 
     def error(correct: dict[str, FloatArray]) -> float:
-        """Return the greatest error of the printed equations relative to the maximum of each nonzero component ``correct``."""
+        """Return the greatest error of the printed equations over the components of ``correct``, relative to their maxima.
+
+        Components that vanish in ``correct`` are left out.
+        """
         sizes = {s: np.abs(x)[clear_mask(PLANE)].max() for s, x in correct.items()}
         return max(
             float(np.abs(printed[s] - right[s])[clear_mask(PLANE)].max() / size)

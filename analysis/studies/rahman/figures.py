@@ -440,7 +440,10 @@ def compute(number: str) -> StudyResult:
 
 
 def _judging_figures(number: str, symbols: tuple[str, ...]) -> str:
-    """Return the numbers of the figures that judge this figure, which shows the components ``symbols``, too."""
+    """Return the numbers of the figures whose statements are also about this figure.
+
+    ``symbols`` are the components that this figure shows.
+    """
     if not symbols:
         return "R5"
     return "R8" if "T" not in symbols[0] else "R8 and below" if number in _JUDGED else "R8 and R14"

@@ -55,7 +55,10 @@ PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
 def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
-    """Return a planar mechanism's joint forces (lb) as printed, with errata mended and masses multiplied by ``share``."""
+    """Return the joint forces (lb) of a planar mechanism by the printed equations; each switch mends one erratum.
+
+    ``share`` multiplies the masses; 0 leaves the inertia out.
+    """
     p, angle = parameters(case.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
     b = printed.bodies(p, erratum_6=erratum_6)
@@ -118,7 +121,11 @@ def _clear_joints(case: Case) -> printed.Joints:
 
 
 def velocity_paths() -> list[Judged]:
-    """Compare momenta by eqs 50a, 51a (forward path, from the crank) with those by 52a, 53a (mixed path, from the slider)."""
+    """Compare the momenta of rod and slider by eqs 50a and 51a with those by eqs 52a and 53a, in the plane and out of it.
+
+    Eqs 50a and 51a take the velocities from the joints on the crank's side (the forward path of the thesis), eqs 52a and 53a
+    from the joints on the slider's side (the mixed path).
+    """
     b, found = printed.bodies(parameters()), []
     for case in (PLANE, *ROW_F):
         q = _clear_joints(case)
@@ -139,7 +146,10 @@ def _both_paths(
 
 
 def replacements() -> list[Judged]:
-    """Judge eqs 57 and 58 by eqs 55 and 56, all with the printed rates and accelerations, in the plane and out of it."""
+    """Judge eqs 57 and 58 by comparison with eqs 55 and 56, in the plane and out of it.
+
+    All four equations are evaluated with the printed rates and accelerations.
+    """
     b, found = printed.bodies(parameters()), []
     for case in (PLANE, *ROW_F):
         apart = []
@@ -163,7 +173,10 @@ def _rounded(values: Named, kind: type[np.floating[Any]]) -> Named:
 
 
 def body_momenta(kind: type[np.floating[Any]]) -> FloatArray:
-    """Return momenta over a planar turn from single precision, computed in ``kind``: (path, body, angle, component)."""
+    """Return the momenta over a turn in the plane, computed in the precision ``kind`` from numbers of single precision.
+
+    The axes of the result are the path as in `_both_paths`, the body (rod, slider), the crank angle, and the component.
+    """
     q = joints(planar(parameters(PLANE.offset_in), np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
     c, b, q = _rounded(printed.CRANK_AT_SPEED, kind), _rounded(printed.bodies(parameters()), kind), _rounded(q, kind)
     paths = _both_paths(c, b, q, printed.joint_rates(c, q))
@@ -334,7 +347,10 @@ def _inertia() -> Iterator[Statement]:
 
 
 def _solution_residuals() -> FloatArray:
-    """Return the residuals, shape (link, real or dual, axis), of eqs 62 to 64 with the forces by eqs 69a to 69q."""
+    """Return the residuals (3, 2, 3) of eqs 62 to 64 with the forces by eqs 69a to 69q.
+
+    The axes are the link, the real or dual part, and the coordinate axis.
+    """
     crank, b = printed.CRANK_AT_SPEED, printed.bodies(parameters())
     r = printed.joint_rates(crank, printed.GENERAL)
     a = printed.joint_accelerations(crank, printed.GENERAL, r)
@@ -381,7 +397,10 @@ def _expansion_differences() -> dict[str, FloatArray]:
 
 
 def _expansion(general: dict[str, FloatArray]) -> Iterator[Statement]:
-    """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q, the forces ``general`` in a general position."""
+    """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q.
+
+    ``general`` has the forces by this solution in a general position.
+    """
     unsolved, (slip, *expanded) = _solution_residuals(), _expansion_differences().items()
     # 63d is the moment about j, 63e the force along k
     unmet = unsolved[1, [1, 0], [1, 2]]

@@ -27,7 +27,12 @@ LOOSE = 1e-3
 
 
 def _detection_errors() -> tuple[float, float]:
-    """Return the shares of shifts, see `judge_detection`, where the iteration fails, and where it accepts an open loop."""
+    """Return the fractions of shifts at which the iteration fails, and at which it accepts an open loop.
+
+    The crank turns fully at all of these shifts. They increase from 0 to the greatest such shift in steps of 2 in, at a4 = 0,
+    10, 20 and 30 in. The iteration runs round the turn as in `turn`. It fails if it does not converge at one of the angles.
+    It accepts an open loop if it converges at all angles and the loop is open at one of them.
+    """
     missed: list[bool] = []
     wrong: list[bool] = []
     for a4 in (0.0, 10.0, 20.0, 30.0):
@@ -65,7 +70,10 @@ def _steps_after_near_starts(case: Case, small: float) -> FloatArray:
 
 
 def _estimate_error(case: Case) -> float:
-    """Return the greatest error (deg) of the planar estimate at theta1 = 0; in a closed loop ball joints turn about i, too."""
+    """Return the greatest difference (deg) between the planar estimate at theta1 = 0 and the angles of the closed loop.
+
+    In the closed loop each ball joint has a third rotation, about i, after theta and eta.
+    """
     p, zero = parameters(case.offset_in, case.twist_deg), np.zeros(1)
     closed = close(p, zero, case.shift_in * INCH)
     (rod,), (slider,) = closed.crank_ball, closed.slider_ball
@@ -128,6 +136,14 @@ def judge_detection() -> Statement:
     )
 
 
+def _right_angle_condition() -> float:
+    """Return the least singular value of A divided by the greatest, with the rod at right angles to the guide, a4 = a2 - a1."""
+    p, zero = parameters(ROD - CRANK), np.zeros(1)
+    matrix, _ = equations(*chain(p, zero, zero, planar(p, zero)), INCH, "printed")
+    singular = np.linalg.svd(matrix[0], compute_uv=False)
+    return float(singular[-1] / singular[0])
+
+
 def judge_ends() -> Iterator[Statement]:
     """Judge the displacements at the end of the iteration, and the estimates at its start."""
     determined = []
@@ -170,8 +186,6 @@ def judge_convergence() -> Iterator[Statement]:
             (OUT_OF_IT, [_steps_after_near_starts(case, small) for case in OUT]),
         )
     }
-    p, zero = parameters(ROD - CRANK), np.zeros(1)
-    singular = np.linalg.svd(equations(*chain(p, zero, zero, planar(p, zero)), INCH, "printed")[0][0], compute_uv=False)
     place = "section 3.3, L1131"
     yield statement(
         "The main disadvantage of this method is that if we can not make good initial estimates for joint "
@@ -208,6 +222,6 @@ def judge_convergence() -> Iterator[Statement]:
         place,
         "least singular value of A divided by its greatest, with lengths in inches; the least over all corrections of a turn",
         ROUNDING,
-        nothing("may: a4 = 38 in, rod at right angles to the guide", singular[-1] / singular[0]),
+        nothing("may: a4 = 38 in, rod at right angles to the guide", _right_angle_condition()),
         at_least("never: least of the ten cases of the graphs", NOTHING, min(map(_condition, (IDEAL, *ALL)))),
     )

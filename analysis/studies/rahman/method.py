@@ -79,7 +79,10 @@ def difference(a: Dual, b: Dual) -> float:
 
 
 def unsure(label: str, slip: str, size: ArrayLike, unit: str) -> Judged:
-    """Return an unjudged case: our scan alone may have the ``slip``, whose result differs by ``size`` from the right one's."""
+    """Return a case that cannot be judged, because our scan alone may have a wrong symbol in an equation.
+
+    ``slip`` names the wrong and the right symbol, ``size`` is the difference between their results.
+    """
     most = float(np.max(np.abs(size)))
     why = f"our scan has {slip}, a difference of {most:.4g} {unit}; the printed thesis may be right (erratum 9)"
     return unjudged(label, why)

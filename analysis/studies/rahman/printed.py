@@ -256,7 +256,10 @@ def separated_rates(c: Crank, q: Joints) -> FloatArray:
 
 
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
-    """Return eq 37f's residual (in/s), rates by 37a to 37e, if eta turns about the axis j that theta has turned (erratum 2)."""
+    """Return the residual of eq 37f (in/s) with erratum 2 mended, with joint rates that satisfy eqs 37a to 37e.
+
+    With the erratum mended, the rate of eta acts about the axis j that the rotation by theta has turned.
+    """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)
     pin = about_k(Dual(angle, shift)) @ about_i(Dual(zero, p.crank_length))
@@ -524,6 +527,9 @@ def crank_bearing_forces(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[F
 
 
 def bearing_moments(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the moments 1T1i and 1T1j (lb.in) by eqs 69q and 69p, which take 1F1k as 0, as for a constant shift."""
+    """Return the moments 1T1i and 1T1j (lb.in) by eqs 69q and 69p.
+
+    The equations take the axial force 1F1k as 0, as the thesis has it for a constant shift.
+    """
     (i, j), s, c = crank_bearing_forces(angle, f), np.sin(angle), np.cos(angle)
     return -j * shift_in - f["f1xd"] * c + f["f1yd"] * s, i * shift_in - f["f1xd"] * s - f["f1yd"] * c

@@ -22,7 +22,10 @@ from .table import IDEAL, SPIKES_DEG, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return eq 37f's residuals (in/s) over the turn: as printed, NaN where eq 41 is unbounded, and with erratum 2 mended."""
+    """Return the residuals of eq 37f (in/s): as printed, NaN where eq 41 is unbounded, and with erratum 2 mended.
+
+    Each residual has a value at every angle of the turn.
+    """
     p, q = parameters(case.offset_in, case.twist_deg), method.joints(method.case_turn(case).unknowns[:, 0])
     lacking = printed.loop_rates(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))[5]
     shift = np.full(printed.GRID_DEG.size, case.shift_in * INCH)
@@ -41,7 +44,10 @@ def _angular_velocity() -> float:
 
 
 def _velocities() -> dict[str, float]:
-    """Return the errors of eqs 33, 35, 36 and 45 by name, against eqs 29 to 32 transformed by the matrices of eqs 1 to 3."""
+    """Return the errors of eqs 33, 35, 36 and 45, by equation, compared with velocities transformed by matrices.
+
+    The matrices are those of eqs 1 to 3, the velocities those of eqs 29 to 32.
+    """
     r, (crank, rod, slider) = printed.joint_rates(method.MOVING, printed.GENERAL), method.links()
     of_crank, of_rod, _ = printed.velocities(method.MOVING, printed.GENERAL, r)
     forward = printed.forward_rod_velocity(method.MOVING, printed.GENERAL, r)
@@ -59,7 +65,10 @@ def _velocities() -> dict[str, float]:
 
 
 def _sinusoidal() -> tuple[float, float]:
-    """Return the errors of eq 28a (in/s) as eq 28's rate, and of eq 28b (in/s2) as the mended 28a's, at alpha = 2."""
+    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = 2.
+
+    Eq 28a should be the rate of eq 28, and eq 28b the rate of eq 28a with its amplitude mended.
+    """
     ratio, amplitude, angle, speed, acceleration, h = 2.0, 2.0, method.AT, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
@@ -198,7 +207,10 @@ EQUATIONS = {
 
 
 def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: FloatArray) -> dict[str, float]:
-    """Return each joint's greatest second rate, eqs 38a to 42a, within 10 deg of a dead centre over the greatest elsewhere."""
+    """Return the greatest second rate of each joint within 10 deg of a dead centre, relative to the greatest elsewhere.
+
+    The second rates are those of eqs 38a to 42a.
+    """
     found = printed.joint_accelerations(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))
     is_close = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
@@ -215,6 +227,15 @@ def _iteration_end(case: Case, angles_deg: FloatArray, start: FloatArray) -> Flo
     return np.asarray(ended.unknowns / unit)
 
 
+def _iteration_end_on_turn(case: Case) -> FloatArray:
+    """Return the unknowns at the end of the printed iteration at every half degree of a turn.
+
+    The iteration starts from the solution at the last multiple of five degrees.
+    """
+    starts = np.repeat(method.case_turn(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
+    return _iteration_end(case, ANGLES_DEG[:-1], starts)
+
+
 def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles (deg) at which sin theta2 is zero in the printed iteration's results, and the unknowns there."""
     sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
@@ -228,8 +249,18 @@ def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[Fl
     return zeros, start
 
 
+def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
+    zeros, start = _zeros(case, angles_deg, unknowns)
+    beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
+    return beside, _iteration_end(case, beside, np.tile(start, (2, 1)))
+
+
 def _roundoff(q: printed.Joints) -> float:
-    """Return the greatest roundoff by eqs 38a to 42a at joint values q, relative to the equation's greatest acceleration."""
+    """Return the greatest roundoff error of eqs 38a to 42a, relative to the greatest acceleration by the same equation.
+
+    ``q`` are the joint values.
+    """
     digit = np.spacing(2.0 * np.pi)
     short, long = (
         printed.joint_accelerations(printed.CRANK_AT_SPEED, at, printed.joint_rates(printed.CRANK_AT_SPEED, at))
@@ -268,12 +299,8 @@ def _denominators() -> Statement:
 def _abnormal() -> Statement:
     """Judge the cause that section 3.2 gives for the spikes, in the case whose dead centres lie near 100 and 300 deg."""
     case, angles = OFFSETS[1], ANGLES_DEG[:-1]
-    # each half degree from the solution at the last multiple of 5 deg
-    starts = np.repeat(method.case_turn(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
-    unknowns = _iteration_end(case, angles, starts)
-    zeros, start = _zeros(case, angles, unknowns)
-    beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
-    closest = _iteration_end(case, beside, np.tile(start, (2, 1)))
+    unknowns = _iteration_end_on_turn(case)
+    beside, closest = _beside_zeros(case, angles, unknowns)
     ratios = _near_dead_centres(case, method.joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
     th2 = np.abs((np.degrees(closest[: closest.shape[0] // 2, 0]) + 180.0) % 360.0 - 180.0)
     return statement(

@@ -48,7 +48,10 @@ def springs() -> tuple[float, ...]:
 
 
 def transient(stiffness: float, number: int = 0) -> float:
-    """Return u's greatest distance from steady motion in turn ``number``, from 0, after the start, relative to its range."""
+    """Return the greatest distance of u from the steady motion in a turn after the start, relative to the range of u.
+
+    ``number`` is the index of the turn; the first turn after the start has the index 0.
+    """
     steady = _steady(stiffness).slider_cm
     started = CM_PER_METRE * run_from_rest(stiffness)["slider.position"][360 * number : 360 * (number + 1)]
     return float(np.abs(started - steady[:-1:4]).max() / np.ptp(steady))
@@ -230,7 +233,10 @@ def slider_motion(stiffness: float) -> list[FloatArray]:
 
 
 def spring_share(stiffness: float) -> float:
-    """Return the range of the spring's force over the greater range of damper's and inertia's in the steady turn."""
+    """Return the range of the spring force divided by the greater of the ranges of damper force and inertia force.
+
+    All ranges are those over the steady turn; the inertia force is the mean effective mass times the acceleration.
+    """
     p = runs.table_3_1(stiffness)
     factors = (p.slider_stiffness, p.slider_damping, mean_effective_mass(p))
     spring, *others = (np.ptp(factor * x) for factor, x in zip(factors, slider_motion(stiffness)))
@@ -268,7 +274,10 @@ def damper_torque(stiffness: float) -> FloatArray:
 
 
 def graph_distance(x: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the distances of a curve's points from another curve, both over the abscissas ``x`` and with the period 1."""
+    """Return the distance of each point of the curve ``one`` from the nearest point of the curve ``other``.
+
+    Both curves have the abscissas ``x`` and the period 1.
+    """
     import shapely
 
     line = [np.column_stack([x[:-1] + shift, other[:-1]]) for shift in (-1.0, 0.0, 1.0)]
@@ -289,7 +298,10 @@ def torque_result() -> StudyResult:
 
 
 def _torques() -> tuple[FloatArray, FloatArray, dict[str, float]]:
-    """Return crank angles (deg), the torques with three springs, and the angles (deg) of the extremes with 1e6 dyn/cm."""
+    """Return crank angles (deg), the torques with three springs, and the extremes of the torque with 1e6 dyn/cm.
+
+    The extremes are the crank angles (deg) at which this torque is greatest and least.
+    """
     angle, torque = _steady(1e6).angle_deg, np.array([_steady(k).torque for k in runs.STIFFNESSES])
     return angle, torque, {"greatest": runs.greatest(angle, torque[1])[0], "least": runs.least(angle, torque[1])[0]}
 

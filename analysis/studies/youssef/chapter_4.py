@@ -69,7 +69,10 @@ DAMPED_RATIOS = (1.0, 0.5)
 
 @cache
 def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
-    """Return the slider's linear equation at 1 rad/s; at another speed only spring and damper differ, see `linear`."""
+    """Return the slider's linear equation at 1 rad/s.
+
+    Without gravity only its spring and damper terms depend on the speed; `linear` sets them for other speeds.
+    """
     return slider_equation(chapter_4(inertia_ratio), 1.0, variant=variant, form=Form.RESONANCE)
 
 
@@ -77,7 +80,7 @@ def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
 def linear(
     speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT, harmonics: int = 2
 ) -> HarmonicMotion:
-    """Return the periodic motion zeta at a crank speed (rad/s), as in the thesis by two harmonics."""
+    """Return the periodic motion zeta at a crank speed (rad/s), by default by two harmonics, as in the thesis."""
     once = equation(inertia_ratio, variant)
     return harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed), harmonics)
 
@@ -117,7 +120,10 @@ def deviation(inertia_ratio: float, variant: Variant = Variant.EXACT) -> float:
 
 @cache
 def undamped_columns(n: int) -> dict[str, FloatArray]:
-    """Return the undamped n-th harmonic over the speed as columns: right for three I4, the other variants for I4 = 1."""
+    """Return the amplitude of the n-th harmonic over the speed without a damper, as columns by name.
+
+    The correct equation has three inertia ratios I4; the other variants have I4 = 1 only.
+    """
     columns = {"speed [rad/s]": SPEEDS}
     for ratio in INERTIA_RATIOS:
         for variant, name in VARIANTS.items():
@@ -231,11 +237,16 @@ def compute_first() -> StudyResult:
     )
 
 
+def ten_harmonics(inertia_ratio: float) -> FloatArray:
+    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVERY`, at omega_c `COMPARED_AT`."""
+    motions = (linear(speed, inertia_ratio, COMPARED_AT, harmonics=MANY) for speed in EVERY.tolist())
+    return np.array([motion.series.amplitudes for motion in motions])
+
+
 def compute_second() -> StudyResult:
     """Compute Fig 4.4: the second harmonic, and its size relative to the first."""
     columns = undamped_columns(2)
-    motions = ([linear(speed, r, COMPARED_AT, harmonics=MANY) for speed in EVERY.tolist()] for r in INERTIA_RATIOS)
-    ten = [np.array([motion.series.amplitudes for motion in those]) for those in motions]
+    ten = [ten_harmonics(r) for r in INERTIA_RATIOS]
     seconds, highers = (
         {
             "greatest over greatest": max(x[:, n].max() / x[:, 1].max() for x in ten),
@@ -387,7 +398,10 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def flattening_damper(inertia_ratio: float, times: float) -> float:
-    """Find the omega_c (1/s) with which the first harmonic's peak is ``times`` its amplitude at a speed higher by `OUTSIDE`."""
+    """Find the damper omega_c (1/s) that limits the peak of the first harmonic.
+
+    The peak is then ``times`` the amplitude of this harmonic at a speed higher by `OUTSIDE`.
+    """
 
     def excess(omega_c: float) -> float:
         at, height = peak(1, inertia_ratio, omega_c)
@@ -397,7 +411,10 @@ def flattening_damper(inertia_ratio: float, times: float) -> float:
 
 
 def one_mass_amplitude(speeds: FloatArray, inertia_ratio: float, omega_c: float) -> FloatArray:
-    """Return a single mass's amplitude at the speeds (rad/s), with the means of M and K, under the force's first harmonic."""
+    """Return the amplitude of a single mass on a spring at the speeds (rad/s), under the first harmonic of the force.
+
+    The mass and the spring follow from the mean values of M and K.
+    """
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / speeds**2 + found.stiffness.mean - found.mass.mean
     amplitude: FloatArray = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / speeds)
@@ -513,7 +530,10 @@ def _dampers() -> Iterator[Statement]:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """Draw the first harmonic with each damper; with the strongest also by the variants of the equation and by the plant."""
+    """Draw the first harmonic with each damper by the correct equation.
+
+    With the strongest damper also draw it by the variants of the equation and by the plant.
+    """
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; corrected [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

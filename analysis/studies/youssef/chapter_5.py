@@ -227,13 +227,19 @@ def change_by_force(with_force: SliderEquation) -> float:
 
 
 def shift_by_motion(ratio: float) -> float:
-    """Return a boundary's greatest shift from the linear equation's to the true motion's, relative to the region's width."""
+    """Return the shift of the first region's boundaries by the motion that the force causes, relative to the region's width.
+
+    It is the greater distance of a boundary by the right linear equation from the same boundary of the true periodic motion.
+    """
     linear, true = (method(chapter_4(ratio)) for method in (hill_region, orbit_region))
     return max(abs(linear.low - true.low), abs(linear.high - true.high)) / true.width
 
 
 def listed_boundaries(given: SliderEquation) -> tuple[tuple[float, float], ...]:
-    """Return the boundaries (low, high) in lambda_k^2 of regions 0 (one, twice) to 2 by (5.13), (5.16), (5.26), h0 = 0."""
+    """Return the boundaries (low, high) in lambda_k^2 of regions 0 to 2 by (5.13), (5.16) and (5.26), with h0 = 0.
+
+    Region 0 is the zeroth boundary, given twice.
+    """
     s, k = given.spring_factor, given.stiffness.to_order(2)
 
     def amplitudes(n: int, lambda_k2: float) -> tuple[float, float]:

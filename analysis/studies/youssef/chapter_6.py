@@ -52,7 +52,10 @@ ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 class Row(NamedTuple):
-    """Figure of chapter VI: problem, claim, statements (or the figure to ``see`` for them), reading of illegible places."""
+    """Figure of chapter VI: its problem, claim, statements, and how we read illegible places.
+
+    ``see`` is the number of the figure that has the statements, if they are not given here.
+    """
 
     problem: str
     claim: str
@@ -175,7 +178,10 @@ def _rocker() -> Iterator[Statement]:
 
 
 def straight_error() -> float:
-    """Return our best linkage's rms distance (mm) from 13 points of a line of 100 mm, passed within 60 deg of the crank."""
+    """Return the rms distance (mm) of our best linkage's curve from 13 points on a straight line of 100 mm.
+
+    The points are passed within 60 degrees of crank rotation.
+    """
     points = ellipse(10.0, N)
     points[:13] = np.column_stack([np.linspace(0.30, 0.20, 13), np.full(13, 0.10)])
     weights = np.where(np.arange(N) < 13, 1.0, 0.0)
@@ -247,7 +253,10 @@ def ratio_to_least(name: str) -> float:
 
 
 def ratios_to_least() -> dict[str, float]:
-    """Return each printed linkage's error, mended, over that of ours, which has no longer link than the longest printed."""
+    """Return the ratio of the printed linkage's error to ours for each figure.
+
+    The printed linkage has its misprint mended; ours has no link longer than the longest printed link.
+    """
     return {f"Fig {n}": ratio_to_least(row.problem) for n, row in TABLE.items()}
 
 
@@ -356,7 +365,10 @@ def linkages_panel(result: StudyResult) -> Panel:
 
 
 def draw_path(result: StudyResult, *, timed: bool) -> Figure:
-    """Draw the target with both coupler curves, their distances from it (over time if ``timed``), and the linkages."""
+    """Draw the target with both coupler curves, their distances from the target, and the linkages.
+
+    The distances are drawn over the crank rotation if the path is timed, otherwise along the target.
+    """
     place = result.columns["place on the target [deg]"]
     distances = Panel(
         x_label="crank rotation [deg]" if timed else "place on the ellipse, its parameter [deg]",
@@ -378,7 +390,10 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
 
 
 def window_sums(linkage: Linkage) -> tuple[float, float]:
-    """Return the rocker function's squared errors at 72 crank angles (deg2): sums within the weighted window and outside."""
+    """Return the sums (deg2) of the squared errors of the rocker function inside and outside the weighted window.
+
+    They are taken at 72 crank angles.
+    """
     task = rocker_function(N, weighted=True)
     within, squares = np.asarray(task.weights) > 1.0, DEG2_PER_RAD2 * evaluate(task, linkage).errors ** 2
     return float(squares[within].sum()), float(squares[~within].sum())
@@ -393,7 +408,11 @@ def mounted_solution() -> Solution:
 
 
 def rocker_columns(name: str) -> dict[str, FloatArray]:
-    """Return a rocker function's target, angles, errors (deg), and least errors by the bound on the transmission angle."""
+    """Return the data of a rocker function's figure.
+
+    They are the target, the rocker angles and their errors over a turn (deg), and the least error for each bound on the
+    transmission angle.
+    """
     p = PROBLEMS[name]
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}

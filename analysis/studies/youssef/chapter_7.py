@@ -155,7 +155,11 @@ def reached_area(low: float, high: float) -> AccessibleArea:
 
 
 def enclosed_area(low: float, high: float) -> float:
-    """Return the area that 21 coupler curves for U between two limits, and the area that P reaches, cover together."""
+    """Return the area that the coupler curves for U between two limits enclose together.
+
+    It is the union of the areas within 21 of these curves and of the area that P reaches, which covers the space between the 21
+    curves.
+    """
     import shapely
 
     found = reached_area(low, high)

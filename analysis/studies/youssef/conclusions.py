@@ -28,7 +28,10 @@ ELLIPSES = {"path (a), 10 cm": 10.0, "12.5 cm": 12.5, "path (b), 15 cm": 15.0}
 
 
 def ellipse_error(semi_axis: float) -> float:
-    """Return the least area between an ellipse (cm) and the curve of path (b)'s links, over the ellipse's area; see L6997."""
+    """Return the least area between an ellipse and the coupler curve of path (b)'s links, relative to the ellipse's area.
+
+    ``semi_axis`` is in cm. The rocker pivot moves with five harmonics; one start of the search is the best motion for path (b).
+    """
     p = PROBLEMS["path-b"]
     formula = f"0.20 + {semi_axis / CM_PER_METRE:g}*cos(t)"
     task = UntimedPath(path=path_from_formula(formula, "0.15 + 0.05*sin(t)", n=AREA_N))

@@ -17,7 +17,7 @@ from .free_crank import Turns
 from .launches import TORQUES, launch, run_acceleration, run_peak
 from .multipliers import judge_multipliers
 from .no_spring import COLLINEAR_SINE, DAMPINGS, DRIFT_TURNS, FEWEST_TURNS, NEAR_LINEAR, TRANSIENT_TURNS, drift
-from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
+from .runs import SPEED, STIFFNESSES, SteadyTurn, plain, steady_turn, table_3_1
 
 #: Launches of Fig 3.6 and 3.9: torque (dyn.cm) and spring (dyn/cm); launches whose links become collinear without a damper.
 LAUNCHES = (*((torque, 1e6) for torque in TORQUES), (1e8, 5e5), (1e8, 2e6))
@@ -27,7 +27,10 @@ DAMPED, FREE = 3e4, 3.0
 
 
 def maxima_spacings(angle: FloatArray, rate: FloatArray) -> FloatArray:
-    """Return crank angles (deg) between maxima of u after th2 = 1 rad, where its ``rate`` falls through zero."""
+    """Return the crank angles (deg) between successive maxima of the slider position after th2 = 1 rad.
+
+    The maxima are where the slider's ``rate`` falls through zero.
+    """
     (at,) = np.nonzero((angle[:-1] > 1.0) & (rate[:-1] > 0.0) & (rate[1:] <= 0.0))
     tops = angle[at] + rate[at] / (rate[at] - rate[at + 1]) * np.diff(angle)[at]
     return np.degrees(np.diff(tops))
@@ -35,7 +38,10 @@ def maxima_spacings(angle: FloatArray, rate: FloatArray) -> FloatArray:
 
 @cache
 def ranges_of_turns(torque: float, stiffness: float, damping: float) -> FloatArray:
-    """Return the range of u (cm) in each turn after a launch but the first two, whose transient decays without a damper too."""
+    """Return the range of u (cm) in each turn after a launch.
+
+    The first two turns are left out: they have the transient of the launch, which also decays without a damper.
+    """
     return Turns.from_run(launch(torque, stiffness, FREE, 6000, damping), start=1.0).slider_range[TRANSIENT_TURNS:]
 
 
@@ -70,13 +76,21 @@ def judge_equations() -> Iterator[Statement]:
     )
 
 
+def compare_torques(soft: SteadyTurn, stiff: SteadyTurn) -> tuple[float, float]:
+    """Compare the crank torques over steady turns with a soft and a stiff spring.
+
+    The first result is the greatest distance between the curves on a graph, relative to the graph's size. The second is the
+    greatest difference at the same crank angle, relative to the greatest torque with the soft spring.
+    """
+    torques = np.array([soft.torque, stiff.torque])
+    seen = graph_distance(soft.angle_deg / 360.0, *torques / np.ptp(torques))
+    return float(seen.max()), float(np.ptp(torques, axis=0).max() / np.abs(soft.torque).max())
+
+
 def judge_constant_speed() -> Iterator[Statement]:
     """Judge the conclusions on the motion at a constant speed of the crank."""
     steady = {k: steady_turn(table_3_1(k), SPEED) for k in STIFFNESSES}
-    soft, *_, stiff = steady.values()
-    torques = np.array([soft.torque, stiff.torque])
-    seen = graph_distance(soft.angle_deg / 360.0, *torques / np.ptp(torques)).max()
-    differs = np.ptp(torques, axis=0).max() / np.abs(soft.torque).max()
+    seen, differs = compare_torques(steady[STIFFNESSES[0]], steady[STIFFNESSES[-1]])
     whole = {mu: replace(drift(mu), compared=DRIFT_TURNS) for mu in DAMPINGS[1:]}
     ten = max(x for mu in NEAR_LINEAR for x in (drift(mu).unsteadiest, drift(mu).bend))
     yield statement(

@@ -143,7 +143,11 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
 
 
 def search_on_machine() -> tuple[float, float]:
-    """Return the weighted errors (deg2) with the slider at rest and at the end of the search of the row at L5853."""
+    """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex.
+
+    The unknowns are the mean and two harmonics of the slider motion. Returns the errors (deg2) with the slider at rest and at
+    the end of the search.
+    """
 
     def error(c: FloatArray) -> float:
         return error_on_machine(motion_of_plant(move_slider(FourierSeries(c[:3], np.append(0.0, c[3:])))))

@@ -99,7 +99,10 @@ def orbit_removing_damper(mechanisms: Iterable[FiveBarParameters]) -> float:
 
 
 def multiplier(inertia_ratio: float, omega_c: float, speed: float) -> float:
-    """Return the right linear equation's greatest multiplier (modulus) with a damper (1/s) at a crank speed (rad/s)."""
+    """Return the greatest modulus of the Floquet multipliers of the correct linear equation.
+
+    ``omega_c`` is the damper (1/s), ``speed`` the crank speed (rad/s).
+    """
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     return float(np.abs(hill_multipliers(found.homogeneous().stiffened(found.spring))).max())
 
@@ -112,7 +115,10 @@ def divide_by_mass(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
 
 
 def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
-    """Return the equation (5.29) of chi, zeta without the factor exp(-1/2 int psi1), from the right linear equation."""
+    """Return the equation (5.29) of chi, derived from the correct linear equation.
+
+    Here zeta is chi times the factor exp(-1/2 int psi1).
+    """
     found = replace(slider_equation(chapter_4(inertia_ratio), crank_speed(0.25)), damping=lambda_c)
     whole = divide_by_mass(found.homogeneous(), ALL_HARMONICS)
     psi1, psi2 = whole.b, whole.c
@@ -121,7 +127,10 @@ def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEq
 
 
 def judge_shifts() -> tuple[Case, ...]:
-    """Judge how a damper of `STATED` shifts and widens the regions 1 to 4 of (5.30), at the I4 of `COMPARED`."""
+    """Judge how a damper of omega_c = `STATED` shifts regions 1 to 4 of (5.30) and changes their widths.
+
+    The values of I4 are those of `COMPARED`.
+    """
     found: list[tuple[float, float, float]] = []
     for ratio in COMPARED:
         for n, free in hill_regions(equation_without_factor(ratio, 0.0), 4).items():
@@ -139,7 +148,10 @@ def judge_shifts() -> tuple[Case, ...]:
 
 
 def error_of_factor(inertia_ratio: float) -> float:
-    """Return the greatest error of (5.29)'s multipliers times the factor of (5.28), with a damper of omega_c = `STATED`."""
+    """Return the greatest error of the multipliers by (5.28) and (5.29), with a damper of omega_c = `STATED`.
+
+    The multipliers of (5.29), times the factor of (5.28), are compared with those of the whole equation.
+    """
     region = hill_region(chapter_4(inertia_ratio))
     found = slider_equation(chapter_4(inertia_ratio, STATED), crank_speed(0.5 * (region.low + region.high)))
     psi1 = divide_by_mass(found.homogeneous(), ALL_HARMONICS).b
@@ -154,11 +166,19 @@ def farthest(values: Iterable[float]) -> float:
     return max(values, key=lambda x: abs(x - 1.0))
 
 
+def region_width(found: Chart, inertia_ratio: float) -> float:
+    """Return the width in lambda_k^2 of the region in a chart at an inertia ratio I4, zero if there is no region."""
+    roots = found.scan_line(inertia_ratio, samples=100).roots
+    return float(np.ptp(roots)) if len(roots) else 0.0
+
+
 def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
-    """Return the region's greatest growth in width from one damper to the next, up to the one that removes the region."""
-    edges = [found.scan_line(inertia_ratio, samples=100).roots for found in charts.values()]
-    at = np.array([np.ptp(roots) if len(roots) else 0.0 for roots in edges])
-    return float(np.diff(at)[at[:-1] > 0.0].max())
+    """Return the greatest change of the region's width from one damper to the next, negative if each change narrows the region.
+
+    Changes from a damper without a region do not count.
+    """
+    widths = np.array([region_width(found, inertia_ratio) for found in charts.values()])
+    return float(np.diff(widths)[widths[:-1] > 0.0].max())
 
 
 def growth_outside_region(omega_c: float) -> float:

@@ -127,7 +127,10 @@ def forward_samples(angle: FloatArray) -> int:
 
 
 def sample_turns(angle: FloatArray, values: FloatArray, start: float = 0.0) -> FloatArray:
-    """Sample values over each whole turn from ``start`` (rad) by cubic splines, until the crank stops; (turns, SAMPLES)."""
+    """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES).
+
+    The values are interpolated by cubic splines; the turns end where the crank first stands still or turns back.
+    """
     n = forward_samples(angle)
     angle, values = angle[:n], values[:n]
     marks = np.arange(start, angle[-1], 2.0 * pi)
@@ -146,14 +149,20 @@ def half_natural_frequencies(stiffness: float) -> FloatArray:
 
 
 def second_halves(runs: Sequence[Trajectory], start: float) -> list[FloatArray]:
-    """Return the mean speeds of the turns in the second half that all runs have, relative to that of each run's first turn."""
+    """Return the mean speeds of the later turns of each run, relative to the mean speed of its first turn.
+
+    The later turns are the second half of the turns that all runs have.
+    """
     speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]
 
 
 def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
-    """Judge by pairs of runs, without the damper and with it, whether a free crank loses mean speed only with a damper."""
+    """Judge whether a free crank loses mean speed only if it has a damper.
+
+    Each pair has a run without the damper and a run with it.
+    """
     cases = []
     for label, runs in pairs.items():
         free, damped = (half.max() for half in second_halves(runs, start))
@@ -163,7 +172,10 @@ def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: floa
 
 
 def undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> str:
-    """Return in words the range of undamped mean speeds of a turn in `damper_cases`, and when a run ends early."""
+    """Return the range of the mean speed of a turn without the damper, in the runs of `damper_cases`, in words.
+
+    The words also say after how many whole turns a run without the damper ends early.
+    """
     free = np.concatenate([second_halves(runs, start)[0] for runs in pairs.values()])
     early = {label: Turns.from_run(run, start).speed.size for label, (run, _) in pairs.items() if run.status}
     ends = "".join(

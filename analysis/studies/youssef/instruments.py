@@ -23,7 +23,10 @@ PULSED = 420.0
 
 
 def crank_speed(inertia: float) -> FloatArray:
-    """Return the crank speed (rad/s) over a turn under a constant torque, with the links' torque steady at `PULSED` rpm."""
+    """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
+
+    The torque that the links need is taken from the steady motion at `PULSED` rpm.
+    """
     torque = turn("A", PULSED)["drive.applied_torque"]
     angle = np.linspace(0.0, 2.0 * pi, len(torque) + 1)
     energy = CubicSpline(angle, torque.mean() - np.append(torque, torque[0])).antiderivative()(angle)
@@ -115,7 +118,10 @@ KICK, LENGTH, DRY = 1.0, 1.0, 0.5
 
 
 def impulse_response(spring: str, time: FloatArray, friction: float = 0.0) -> FloatArray:
-    """Return u (m) of the struck, disconnected slider at times (s); dry friction (N) shifts the centre of each half swing."""
+    """Return the position (m) over time (s) of the disconnected slider after an impulse.
+
+    Dry friction (N) shifts the centre of each half swing.
+    """
     p = rig(spring)
     decay = 0.5 * p.slider_damping / p.slider_mass
     frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)

@@ -26,7 +26,10 @@ def runge_kutta(
     n: int,
     stages: tuple[tuple[float, float], ...] = CLASSICAL,
 ) -> NDArray[Any]:
-    """Integrate y' = f(t, y) by n steps h from 0; ``stages`` are (part of the step, weight in sixths); return all states."""
+    """Integrate y' = f(t, y) from t = 0 by n steps of length h of the classical Runge-Kutta method; return all states.
+
+    ``stages`` gives for each stage its time as a fraction of the step, and its weight in sixths.
+    """
     states = [np.asarray(y)]
     for i in range(n):
         y0 = states[-1]
@@ -66,7 +69,10 @@ def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
 
 
 def order_of_series(highest: int) -> float:
-    """Return the order, from h = 0.1 and 0.05, of the Taylor series for y' = -y with derivatives of y' up to ``highest``."""
+    """Return the order of the Taylor series method on y' = -y, from the errors with h = 0.1 and 0.05.
+
+    The series has the derivatives of y' up to the order ``highest``.
+    """
     errors = []
     for n in (10, 20):
         growth = sum((-1.0 / n) ** k / factorial(k) for k in range(highest + 2))
@@ -75,6 +81,9 @@ def order_of_series(highest: int) -> float:
 
 
 def spurious_root(past: ArrayLike, rates: ArrayLike, h: float) -> float:
-    """Return the greatest spurious root (modulus) of a corrector with coefficients of y and y', on y' = -y with a step h."""
+    """Return the greatest modulus of a corrector's spurious roots on y' = -y with a step h.
+
+    The spurious roots are all but the one near exp(-h). ``past`` and ``rates`` are the corrector's coefficients of y and of y'.
+    """
     roots = np.roots(np.asarray(past) + h * np.asarray(rates))
     return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())

@@ -62,7 +62,10 @@ UNSAID = (
 def launch(
     torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000, damping: float = 3e4
 ) -> Trajectory:
-    """Simulate a launch from rest with T0 = ``torque`` (CGS units): T = T0 (1 - th2) up to 1 rad, an event, then zero."""
+    """Simulate the mechanism of Table 3.1 from rest: the crank torque is T = T0 (1 - th2) up to th2 = 1 rad, then zero.
+
+    ``torque`` is T0. Torque, stiffness and damping are in CGS units; an event marks the end of the torque.
+    """
     return simulate(
         table_3_1(stiffness, damping),
         Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
@@ -162,7 +165,10 @@ def _launch_result(
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
-    """Draw a quantity of launches with these torques or springs over time, with a circle at 1 rad, where the torque ends."""
+    """Draw a quantity of several launches over time, with a circle at th2 = 1 rad, where the torque ends.
+
+    ``values`` are the torques or springs of the launches, ``legend`` is the heading of the legend.
+    """
     time, *columns = result.columns.values()
     name = list(result.columns)[1]
     curves, circles = [], []
@@ -189,12 +195,11 @@ RISE = (
 
 def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
     """Judge whether the crank speed rises linearly, and whether it peaks before the torque ends."""
-    bows, peaks = [], {label: run_peak(run) for label, run in runs.items()}
-    for (label, run), peak in zip(runs.items(), peaks.values()):
-        before = run.time < peak.time
-        rise = np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
-        bows.append(at_most(f"distance from a line; {label}", ALIKE, distance_from_line(*rise)))
-    angle = max(peak.angle for peak in peaks.values())
+    bows = [
+        at_most(f"distance from a line; {label}", ALIKE, distance_from_line(*_rise_to_peak(run)))
+        for label, run in runs.items()
+    ]
+    angle = max(run_peak(run).angle for run in runs.values())
     return (*bows, at_most("crank angle of the peak, greatest", 1.0, angle, "rad"))
 
 
@@ -210,6 +215,13 @@ def run_peak(run: Trajectory) -> Peak:
     """Return the greatest crank speed of a run, interpolated between the samples."""
     time, speed = greatest(run.time, run["crank.speed"])
     return Peak(time, float(np.interp(time, run.time, run["crank.angle"])), speed)
+
+
+def _rise_to_peak(run: Trajectory) -> tuple[FloatArray, FloatArray]:
+    """Return time and crank speed up to the peak of the speed, each divided by its value at the peak."""
+    peak = run_peak(run)
+    before = run.time < peak.time
+    return np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
 
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
@@ -321,7 +333,10 @@ def torque_over_time() -> StudyResult:
 
 
 def draw_torque_over_time(result: StudyResult) -> Figure:
-    """Draw the torque over the time to 1 rad, linearly and logarithmically, with powers -1 and -2 through T0 = 1e8 dyn.cm."""
+    """Draw the torque over the time to 1 rad, on linear and on logarithmic axes.
+
+    Lines with the exponents -1 and -2 pass through the point of T0 = 1e8 dyn.cm.
+    """
     torque, time = result.columns["T0 [dyn.cm]"], result.columns["time to 1 rad [s]"]
     hinge, three = float(np.interp(1e8, torque, time)), np.interp(TORQUES, torque, time)
     curves = [

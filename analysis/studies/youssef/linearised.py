@@ -51,7 +51,10 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[FloatArray
 
 @cache
 def datum(sigma2: float, rocker: float | None = None, sigma3: float = 1.0) -> Datum:
-    """Return the datum angles: the rocker's, unless given, by (4.1), those of crank and coupler by the closure (4.6)."""
+    """Return the datum angles about which the equations are linearised.
+
+    The rocker's angle follows from (4.1) unless it is given, the angles of crank and coupler from the closure (4.6).
+    """
     swing = angles(with_crank(sigma2, sigma3=sigma3))[1]
     middle = 0.5 * (swing.max() + swing.min()) if rocker is None else rocker
 
@@ -94,7 +97,10 @@ def elimination_residuals(sigma2: float) -> dict[str, float]:
 
 
 def residuals() -> dict[str, float]:
-    """Return each equation's greatest residual, (4.10) to (4.20), over its greatest term, in a motion of the plant."""
+    """Return the greatest residual of each equation (4.10) to (4.20) in a motion of the plant, relative to the largest term.
+
+    The plant is the mechanism of Table 3.1 without gravity, with a coupler that has mass and a rocker that is not balanced.
+    """
     par, w = table_3_1(1e6, gravity=0.0), SPEED * RAD_S_PER_RPM
     p, worst = par.constants(), dict[str, float]()
     m3, m4, r3, r4 = par.coupler_mass, par.rocker_mass, par.coupler_cog_distance, par.rocker_cog_distance
@@ -125,7 +131,10 @@ def residuals() -> dict[str, float]:
 
 
 def coefficient_ratios(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
-    """Return (4.21)'s coefficients as printed, at the datum of (4.1), each over the right coefficient of first order."""
+    """Return the coefficients of (4.21) as printed, each divided by the correct coefficient of first order.
+
+    The printed coefficients are evaluated at the datum of (4.1).
+    """
     mechanism = with_crank(sigma2, inertia_ratio)
     right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
     parts = printed(ratios(mechanism), datum(sigma2))
@@ -342,7 +351,9 @@ def _simplification() -> Iterator[Statement]:
     longer, shorter = (expansion_errors(x) for x in SHORT)
     left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
     parts = printed(ratios(chapter_4(1.0)), datum(SIGMA2))
-    varying = max(abs(x) for one in (parts.spring, parts.inertia, parts.stiffness) for x in (one.cos[1], one.sin[1]))
+    series = (parts.spring, parts.inertia, parts.stiffness)
+    # B1 to F1
+    varying = max(abs(x) for one in series for x in (one.cos[1], one.sin[1]))
     yield statement(
         "The coefficients B1, C1, H1, P1, [...], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
         "least a factor [...] in the worst cases.",
