@@ -240,8 +240,9 @@ def judge_damper(charts: Mapping[float, Chart]) -> Iterator[Statement]:
         "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
         "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
         "5.3.2, L3917-3921",
-        "least growth of the I4 at which the region begins, from one damper to the next (*to the right* on a plot over "
-        "I4, L3910); greatest omega_c that is needed to remove the region up to I4 = 1.5; for the true periodic motion",
+        "least growth of the I4 at which the region begins, from one damper to the next of 0.05, 0.1 and 0.15 1/s (*to the "
+        "right* on a plot over I4, L3910; without a damper the region begins at I4 = 0); greatest omega_c that is needed to "
+        "remove the region up to I4 = 1.5; for the true periodic motion",
         "none: the sign decides, and whether the region is removed",
         at_least("growth", 0.0, np.diff(tips).min()),
         at_most("omega_c", "0.45", greatest_removing_damper("true orbit"), "1/s"),

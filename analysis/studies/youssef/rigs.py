@@ -37,9 +37,7 @@ from ..variation import cache, vary
 LOST = "the measured curves are lost with the figures"
 #: Relative rise of the amplitude up to which no one notices it on a graph.
 NOTICED = ALIKE
-SEEN_IN_RECORDS = (
-    f"{NOTICED:g} of the amplitude there, the rule for *the same*, since neighbouring records are compared"
-)
+SEEN_IN_RECORDS = f"{NOTICED:g}, the rule for *the same*, since neighbouring records are compared"
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05
 #: The rig of each spring.
