@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from csv import reader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
@@ -113,5 +114,5 @@ def cells(output: str) -> dict[str, list[str]]:
 
 def csv(path: Path) -> dict[str, np.ndarray]:
     """Return the columns of a CSV file of numbers, by their headings."""
-    head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    head = next(reader(path.read_text(encoding="utf-8").splitlines()))
     return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))
