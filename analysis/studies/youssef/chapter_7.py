@@ -181,9 +181,11 @@ def departures_from_path() -> tuple[float, float]:
     second, the greatest departure over all amplitudes is taken in each interval between two precision points; the result is
     the least of these.
     """
-    change = np.sin(0.5 * PRECISION * TURN) ** 2
-    away = np.max([np.abs(coupler_point(TURN, a * change) - coupler_point(TURN, 0.0)) for a in BETWEEN], axis=0)
-    kept = away[:: (TURN.size - 1) // PRECISION].max()
+    # finer than the plot: the departures are listed to four digits
+    rotation = np.linspace(0.0, 2.0 * pi, 2000 * PRECISION + 1)
+    change = np.sin(0.5 * PRECISION * rotation) ** 2
+    away = np.max([np.abs(coupler_point(rotation, a * change) - coupler_point(rotation, 0.0)) for a in BETWEEN], axis=0)
+    kept = away[::2000].max()
     return float(kept), float(away[:-1].reshape(PRECISION, -1).max(axis=1).min())
 
 
