@@ -723,7 +723,7 @@ def directional(
 ) -> Any:
     """Status, or the result where it is good."""
     result = (c_double * (len(unknowns) if kind == "Directional" else len(knowns)))()
-    given = (*c.arrays(unknowns, None)[:2], *c.arrays(knowns, (c_double * len(seed))(*seed)), result)
+    given = (*c.arrays(unknowns, ())[:2], *c.arrays(knowns, (c_double * len(seed))(*seed)), result)
     status = c(f"Get{kind}Derivative", *given, *((c_size_t(len(result)),) if c.library.fmi == 3 else ()))
     return list(result) if status == OK else status
 
