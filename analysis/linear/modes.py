@@ -19,9 +19,16 @@ from linkwork.errors import InputError
 from linkwork.integrate import UNDEFINED
 from linkwork.mechanism import Mechanism
 
-from .. import run
 from ..mechanisms import InitialState, Parameters, find_mechanism
-from ..run import InductionMotor, Inputs, check_run, complete_initial_state, complete_inputs, takes_published
+from ..run import (
+    InductionMotor,
+    Inputs,
+    check_run,
+    complete_initial_state,
+    complete_inputs,
+    start_ratio,
+    takes_published,
+)
 from ..units import RAD_S_PER_RPM
 from . import model
 from .equilibrium import Equilibrium, find_equilibrium
@@ -206,7 +213,7 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs, initial: Any) -> dict[int
     motors = {
         c.freedom for c in mechanism.channels for part in inputs.parts(c.argument) if isinstance(part, InductionMotor)
     }
-    return {n: float(run.start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
+    return {n: float(start_ratio(start[n], begins)) * speeds[first] for n in motors.intersection(cranks)} | speeds
 
 
 def _pair(likeness: FloatArray) -> Iterable[tuple[int, int]]:

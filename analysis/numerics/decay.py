@@ -36,6 +36,8 @@ _MISFIT = 0.03
 _GUESSED = 400
 #: Damping ratios that are tried for the first guess, each with this number of frequencies.
 _RATIOS, _FREQUENCIES = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8), 80
+#: Error of a record whose swings do not become smaller.
+_GROWING = "the swings of the record do not decay: it must begin after the impulse, and run freely"
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
 
@@ -245,7 +247,7 @@ def _fit_curve(t: NDArray[np.float64], x: NDArray[np.float64]) -> Decay:
             "or the release"
         )
     if not (rate > 0.0 and np.isfinite(spread).all()):
-        raise InputError("the swings of the record do not decay: it must begin after the impulse, and run freely")
+        raise InputError(_GROWING)
     decrement = 2.0 * pi * rate / frequency
     slope = np.array([1.0 / rate, -1.0 / frequency])  # of log(decrement) over rate and frequency
     return Decay(
@@ -344,7 +346,7 @@ def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:
     swings = np.abs(np.diff(height))
     start = -float(np.polyfit(n[:-1], np.log(swings), 1)[0])
     if start <= 0.0:
-        raise InputError("the swings of the record do not decay: it must begin after the impulse, and run freely")
+        raise InputError(_GROWING)
 
     def model(n: NDArray[np.float64], size: float, half: float, offset: float, dry: float = 0.0) -> NDArray[np.float64]:
         q = np.exp(-half)

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize
 
@@ -36,6 +35,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNa
 from linkwork.five_bar.published import SETS
 from linkwork.slider_crank import published as rahman
 from tests.mechanisms import rotor_on_cart, torsion
+from tests.scripts import linkwork
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -454,16 +454,15 @@ objective = "{objective}"
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def of(*options, margin=0.25, objective="least change"):
+    def of(*options, margin=0.25, objective="least change", code=0):
         Path("case.toml").write_text(CASE.format(margin=margin, objective=objective))
-        return CliRunner().invoke(cli.main, ["tune", "case.toml", *options])
+        return linkwork("tune case.toml", *options, code=code)
 
     return of
 
 
 def test_command_writes_the_changed_case(run):
     result = run()
-    assert result.exit_code == 0, result.output
     assert "slider.damping" in result.output
     assert "verified: response followed again" in result.output
     made = load_case("out/case-tuned.toml")
@@ -475,8 +474,7 @@ def test_command_writes_the_changed_case(run):
 
 @pytest.mark.slow
 def test_command_reports_what_cannot_be_met(run):
-    result = run("--no-plot", "--json", "--set", 'tune.peak.below="10 N"', margin=0.25)
-    assert result.exit_code == cli.CHECK_FAILED, result.output
+    result = run("--no-plot", "--json", "--set", 'tune.peak.below="10 N"', margin=0.25, code=cli.CHECK_FAILED)
     found = json.loads(result.stdout)
     assert not found["met"]
     assert found["requirements"]["stable motion"]["met"]
@@ -497,15 +495,13 @@ def test_command_reports_what_cannot_be_met(run):
     ],
 )
 def test_command_says_what_is_wrong(run, options, words):
-    result = run(*options)
-    assert result.exit_code == cli.WRONG
+    result = run(*options, code=cli.WRONG)
     assert words in result.stderr
 
 
 def test_a_case_of_a_tuning_is_taken_for_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(cli.main, ["run", str(EXAMPLES / "tuning.toml")])
-    assert result.exit_code == cli.WRONG
+    result = linkwork("run", EXAMPLES / "tuning.toml", code=cli.WRONG)
     assert "linkwork tune" in result.stderr
 
 

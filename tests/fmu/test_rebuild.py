@@ -10,12 +10,12 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from click.testing import CliRunner
 
 from analysis import cli
 from analysis.export import BuildError, rebuild
 from analysis.export.bill import BILL
 from analysis.numerics.cache import cache_root, lock_folder
+from tests.scripts import linkwork
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,8 +102,7 @@ def test_a_library_that_is_not_of_its_sources_is_found(natives: dict[str, Path],
     parts = list(rebuild(wrong))
     assert [part.same for part in parts] == [listed, False]
     assert parts[1].what == place
-    result = CliRunner().invoke(cli.main, ["verify", "--rebuild", str(wrong)])
-    assert result.exit_code == cli.CHECK_FAILED
+    result = linkwork("verify --rebuild", wrong, code=cli.CHECK_FAILED)
     assert place.rpartition("/")[2][:12] in result.output
 
 

@@ -3,15 +3,12 @@
 import contextlib
 import io
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
-from analysis.cli import main
 from analysis.numerics.decay import fit_decay
 from analysis.periodic import Crossing, mean_effective_mass, natural_frequency
 from analysis.studies.youssef import chapter_8, instruments, rig_1, rig_2, rigs
@@ -20,6 +17,7 @@ from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import Variant
 from linkwork.five_bar.published import SETS
 from tests import published
+from tests.scripts import linkwork
 
 from .results import check, every
 
@@ -334,8 +332,7 @@ class TestPage:
         commands = re.findall(r"```sh\nlinkwork (.*?)\n```", PAGE.read_text())
         assert len(commands) == 8
         for command in commands:
-            done = CliRunner().invoke(main, shlex.split(command), catch_exceptions=False)
-            assert done.exit_code == 0, command
+            linkwork(command)
         assert (tmp_path / "out" / "rig-2-spring-c-resonance.csv").exists()
         assert (tmp_path / "out" / "figures" / "rig-2-forces.png").exists()
 

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from analysis import studies
-from analysis.cli import main
 from analysis.numerics.dual import Dual
 from analysis.slider_crank import JointLoads, close, joint_loads
 from analysis.slider_crank.dual_dynamics import Binor
@@ -37,6 +35,7 @@ from ..published_rahman import (
     TORQUE_LB_IN,
     TWISTS_DEG,
 )
+from ..scripts import linkwork
 from ..slider_cranks import components
 from .results import check, every, marks_of, result, statement
 
@@ -564,14 +563,11 @@ class TestFiles:
         assert table["dead centre; ideal [deg]"][:2] == pytest.approx([90.0, 270.0], abs=1e-9)
 
     def test_commands(self, tmp_path: Path) -> None:
-        runner = CliRunner()
-        listed = runner.invoke(main, ["figures", "--list"])
-        assert listed.exit_code == 0
+        listed = linkwork("figures --list")
         assert "R5  Slider displacement S4" in listed.output
         assert "rahman-closure  Rahman's loop closure" in listed.output
         assert '"Slider displacement curves are almost semi-sinusoidal type' in listed.output
         assert " judged at R5\n" in listed.output
-        made = runner.invoke(main, ["figures", "R5", "--out", str(tmp_path)])
-        assert made.exit_code == 0, made.output
+        made = linkwork("figures R5 --out", tmp_path)
         assert "DOES NOT HOLD" in made.output
         assert sorted(path.name for path in tmp_path.glob("[!.]*")) == ["fig_R5.csv", "fig_R5.png"]

@@ -557,10 +557,8 @@ def _values_to_search(response: Response, places: int) -> list[float]:
     """
     values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
     reach = _SAME_VALUE * (response.high - response.low)
-    highest: dict[int, Extremum] = {}
-    for top in response.maxima():
-        if top.coordinate not in highest or top.amplitude > highest[top.coordinate].amplitude:
-            highest[top.coordinate] = top
+    # of each coordinate the last one stays, which is the highest
+    highest = {top.coordinate: top for top in sorted(response.maxima(), key=lambda top: top.amplitude)}
     for top in highest.values():
         if all(abs(top.parameter - value) > reach for value in values):
             values.append(top.parameter)
