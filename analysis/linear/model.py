@@ -29,7 +29,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import Parameters, find_mechanism
 from ..numerics import symbolic
-from ..run import Inputs, check_run, encode, expressions, float_array, sample, takes_published
+from ..run import Inputs, check_run, encode, expressions, float_array, law_slopes, sample, takes_published
 
 if TYPE_CHECKING:
     import control
@@ -365,8 +365,12 @@ def _index(name: str, names: tuple[str, ...]) -> int:
     return names.index(name)
 
 
-def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
+def evaluate(
+    parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray, inputs: Inputs | None = None
+) -> dict[str, FloatArray]:
     """Return the arrays of `Matrices` by name, at states (s, size) with channels (s, channels), stacked along the first axis.
+
+    The torques of motors and torsion bars among ``inputs`` are part of the model: K, C and H include their derivatives.
 
     Raises InputError if a state or a channel is not finite or no degree of freedom is free; AssemblyError if the links cannot
     be joined at a state.
@@ -391,11 +395,17 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
         array = np.asarray(value)
         return np.moveaxis(array.reshape(array.shape[0], n, columns), 1, 0)
 
-    size, inputs = len(its.free), len(its.input_names)
+    size, acting = len(its.free), len(its.input_names)
     order = ("outputs", "acceleration", "M", "C", "K", "F", "H", "D")
-    arrays = dict(zip(order, map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))))
+    arrays = dict(zip(order, map(stack, raw, (1, 1, size, size, size, acting, 2 * size, acting))))
     for name in ("outputs", "acceleration"):
         arrays[name] = arrays[name][:, :, 0]
+    places = [*its.free, *(len(mechanism.freedoms) + k for k in its.free)]
+    for channel, place, slope in law_slopes(encode(inputs or Inputs(), mechanism), states):
+        if channel in its.forces and place in places:
+            state, column = places.index(place), its.forces.index(channel)
+            arrays["CK"[state < size]][:, :, state % size] -= slope[:, None] * arrays["F"][:, :, column]
+            arrays["H"][:, :, state] += slope[:, None] * arrays["D"][:, :, column]
     # adding 0.0 changes -0.0 to 0.0
     return arrays | {name: arrays[name] + 0.0 for name in ("C", "K")}
 
@@ -454,9 +464,8 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
         this instant.
     inputs : Inputs, optional
         Inputs at time 0, such as `Equilibrium.inputs`; they decide which degrees of freedom are free. By default no input acts.
-        If a torque or force is a law of the state, such as a motor's or a torsion bar's, only its value is used: the poles are
-        those under a constant torque. To include the law, add b s to the column of A that belongs to a state: s is the law's
-        derivative with respect to this state, b the column of B that belongs to the torque or force.
+        Motors and torsion bars are part of the model, which includes the derivatives of their torques. Of a Function only the
+        value is used, as of a controller: the loop is not closed.
 
     Raises
     ------
@@ -478,5 +487,5 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     if len(states) != 1:
         raise InputError(f"{len(states)} states: linearise takes one state; linearise_orbit takes many")
     modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)
-    arrays = {name: array[0] for name, array in evaluate(parameters, modes, states, channels).items()}
+    arrays = {name: array[0] for name, array in evaluate(parameters, modes, states, channels, inputs).items()}
     return LinearModel(parameters=parameters, modes=modes, state=states[0], channels=channels[0], **arrays)

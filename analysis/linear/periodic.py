@@ -60,6 +60,11 @@ class Orbit(Protocol):
 
     def turn(self, samples: int, /) -> Turn: ...
 
+    @property
+    def run_inputs(self) -> Inputs:
+        """Inputs that drive the cranks in a run: motors among them are part of the linear model."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PeriodicModel(Matrices):
@@ -73,6 +78,8 @@ class PeriodicModel(Matrices):
         States of the motion at the times k period / s, k = 0 ... s - 1.
     channels : ndarray, shape (s, channels)
         Values of the mechanism's channels at these times.
+    inputs : Inputs or None
+        Inputs whose motors and torsion bars are part of the model.
 
     Notes
     -----
@@ -82,6 +89,7 @@ class PeriodicModel(Matrices):
     period: float
     states: FloatArray
     channels: FloatArray
+    inputs: Inputs | None = None
 
     def __len__(self) -> int:
         return len(self.states)
@@ -167,7 +175,7 @@ class PeriodicModel(Matrices):
         times = self.period * np.arange(count) / count
         motion, channels = self.motion(), self.interpolate(self.channels)
         states = full_states(self.mechanism, [motion(t) for t in times])
-        arrays = evaluate(self.parameters, self.modes, states, np.array([channels(t) for t in times]))
+        arrays = evaluate(self.parameters, self.modes, states, np.array([channels(t) for t in times]), self.inputs)
         closer = Matrices(parameters=self.parameters, modes=self.modes, **arrays)
         rates = [np.trace(one.A, axis1=-2, axis2=-1).mean() for one in (self, closer)]
         if abs(rates[0] - rates[1]) > RESOLVED * np.abs(self.mean().poles).max():
@@ -180,8 +188,7 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one multiplier is 1 along a motion of the free plant. Under a motor they are not those of the motion, because the
-        model has no derivative of the motor's torque; `PeriodicOrbit.multipliers` include it.
+        one multiplier is 1, that of a deviation along the motion.
 
         Raises
         ------
@@ -225,9 +232,8 @@ def linearise_orbit(
         States at evenly spaced times of one period, without the end point: all coordinates, then all rates; or an object such
         as `analysis.periodic.PeriodicOrbit`.
     inputs : Inputs, optional
-        Inputs along a motion given as an array, whose first state is at time 0; none by default. If a torque or force is a law
-        of the state, such as a motor's or a controller's, only its value is used: the model does not include the law's
-        derivative, not even along an orbit under a motor.
+        Inputs along a motion given as an array, whose first state is at time 0; none by default. Motors and torsion bars are
+        part of the model, as in `linearise`; of a Function, such as a controller, only the value is used.
     period : float, optional
         Period (s); by default the period of the orbit, or, for an array at a constant prescribed speed, the time of one turn.
     samples : int
@@ -248,7 +254,7 @@ def linearise_orbit(
             raise InputError("an orbit has its own inputs and period: they cannot be given as well")
         turn = motion.turn(samples)
         states, channels = _resample(mechanism, turn)
-        modes, period = turn.modes, turn.period
+        modes, period, inputs = turn.modes, turn.period, motion.run_inputs
     else:
         states = full_states(mechanism, motion)
         inputs, _ = check_run(mechanism, inputs, None)
@@ -262,8 +268,10 @@ def linearise_orbit(
         modes, channels = model.sample_channels(
             mechanism, inputs, period * np.arange(len(states)) / len(states), states
         )
-    arrays = evaluate(parameters, modes, states, channels)
-    found = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
+    arrays = evaluate(parameters, modes, states, channels, inputs)
+    found = PeriodicModel(
+        parameters=parameters, modes=modes, period=period, states=states, channels=channels, inputs=inputs, **arrays
+    )
     found.check()
     found.check_resolution()
     return found

@@ -76,6 +76,7 @@ from .masses import mass_origins as mass_origins
 from .masses import trace_masses as trace_masses
 from .masses import with_sections as with_sections
 from .prepared import compute_outputs as compute_outputs
+from .sampling import law_slopes as law_slopes
 from .sampling import sample as sample
 from .signals import MOTOR as MOTOR
 from .signals import Function as Function

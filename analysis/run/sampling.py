@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isfinite
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from .inputs import NUMBER, Encoded
+from .signals import kloss
 
 
 class NotFiniteError(InputError):
@@ -88,6 +90,19 @@ def name_channels(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
 def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64]) -> None:
     """Mark in ``laws`` the torsion bars that have unwound at state x as released."""
     laws[x[encoded.source.law_places[:, 1]] >= laws[:, 1], 2] = 0.0
+
+
+def law_slopes(encoded: Encoded, states: NDArray[np.float64]) -> Iterator[tuple[int, int, NDArray[np.float64]]]:
+    """Yield the derivatives of the torques of bars and motors at states, shape (s, size).
+
+    Each is the index of the torque's channel, the index of the component of the state on which it depends, and the derivative
+    with respect to this component, shape (s,).
+    """
+    for law, (channel, angle, speed) in zip(encoded.source.laws, encoded.source.law_places.tolist()):
+        if law[2] != 0.0:
+            yield channel, angle, np.where(states[:, angle] < law[1], -law[0] / law[1], 0.0)
+        if law[3] != 0.0:
+            yield channel, speed, kloss(law[3:], states[:, speed] + 1e-30j).imag / 1e-30  # a complex step: exact
 
 
 def function_values(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:

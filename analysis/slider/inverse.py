@@ -26,7 +26,7 @@ from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
-from ..run import complete_speed, compute_outputs, takes_published
+from ..run import Inputs, complete_speed, compute_outputs, takes_published
 from ..units import Amount, in_si
 from ..youssef import require_no_contact_friction
 
@@ -119,6 +119,11 @@ class SliderDrive:
     def modes(self) -> tuple[int, ...]:
         """Return the mechanism's mode parameters: a single 1, because the crank speed is prescribed."""
         return (1,)
+
+    @property
+    def run_inputs(self) -> Inputs:
+        """Return the inputs that drive the crank in a run; the control force is left out."""
+        return Inputs(speed=self.crank_speed)
 
     @property
     def period(self) -> float:

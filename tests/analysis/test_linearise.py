@@ -11,11 +11,10 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
-from analysis import InductionMotor, Inputs, figures, linear, ramp
+from analysis import InductionMotor, Inputs, TorsionBar, figures, linear, ramp
 from analysis.linear import EquilibriumError, find_equilibria, find_equilibrium, linearise, linearise_orbit
 from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
@@ -303,7 +302,7 @@ def test_monodromy_is_that_of_the_variational_equations(turning) -> None:
 
 
 def test_multipliers_of_a_motor_drive() -> None:
-    """The crank's speed varies: equal angles are no equal times, and the motor's slope is a feedback of the speed."""
+    """The crank's speed varies: equal angles are no equal times, and the motor's slope damps the speed."""
     motor = InductionMotor(breakdown_torque=6.0, breakdown_slip=0.2, synchronous_speed=40.0)
     orbit = find_orbit(TABLE_3_1, torque=motor)
     along = linearise_orbit(TABLE_3_1, orbit, samples=256)
@@ -315,20 +314,40 @@ def test_multipliers_of_a_motor_drive() -> None:
 
     w2 = along.states[:, 2]
     assert along.channels[:, 0] == pytest.approx(torque(w2), rel=1e-9)
-    closed = along.A.copy()
-    closed[:, :, 2] += along.B[:, :, 0] * np.imag(torque(w2 + 1e-30j) / 1e-30)[:, None]
-    a = along.interpolate(closed)
-
-    def rates(t: float, y: np.ndarray) -> np.ndarray:
-        return (a(t) @ y.reshape(4, 4)).ravel()
-
-    end = solve_ivp(rates, (0.0, along.period), np.eye(4).ravel(), method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    values = np.linalg.eigvals(end.reshape(4, 4))
+    values = np.linalg.eigvals(along.monodromy(1e-11))
     values = values[np.argsort(np.abs(values - 1.0))]
     # along the motion nothing dies out; across it, the multipliers of the section
     assert values[0] == pytest.approx(1.0, abs=1e-6)
     expected = sorted(orbit.multipliers, key=lambda z: (abs(z), z.imag))
     assert np.array(sorted(values[1:], key=lambda z: (abs(z), z.imag))) == pytest.approx(np.array(expected), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "torque"),
+    [
+        (
+            InductionMotor(breakdown_torque=6.0, breakdown_slip=0.2, synchronous_speed=40.0),
+            lambda angle, speed: 12.0 / ((1.0 - speed / 40.0) / 0.2 + 0.2 / (1.0 - speed / 40.0)),
+        ),
+        (TorsionBar(torque=10.0, release_angle=1.5), lambda angle, speed: 10.0 * (1.0 - angle / 1.5)),
+    ],
+)
+def test_drives_that_depend_on_the_state_are_part_of_the_model(law: Any, torque: Any) -> None:
+    """Rates and outputs of the plain functions under the law itself, by differences."""
+    x, p = np.array([0.4, 0.002, 30.0, 0.1, 0.0, 0.0]), TABLE_3_1.constants()
+    model = linearise(TABLE_3_1, x[:4], Inputs(torque=(1.0, law), force=2.0))
+
+    def rates_and_outputs(y: np.ndarray) -> np.ndarray:
+        applied = FIVE_BAR.equations.apply_inputs((0.0,), (1.0 + torque(y[0], y[2]), 0.0, 0.0, 2.0, 0.0, 0.0), p)
+        outputs = FIVE_BAR.equations.outputs(tuple(y), applied, 0.0, p)
+        kept = [outputs[FIVE_BAR.output_names.index(name)] for name in model.output_names]
+        return np.array([*FIVE_BAR.equations.derivative(tuple(y), applied, p)[:4], *kept])
+
+    steps = 1e-5 * np.eye(6)[:4]
+    slopes = np.array([(rates_and_outputs(x + h) - rates_and_outputs(x - h)) / 2e-5 for h in steps]).T
+    sizes = np.abs(slopes).max(axis=0)
+    assert model.A / sizes == pytest.approx(slopes[:4] / sizes, abs=1e-6)
+    assert model.H / sizes == pytest.approx(slopes[4:] / sizes, abs=1e-6)
 
 
 def test_the_samples_are_models_and_their_mean_is_the_mean(turning) -> None:

@@ -24,7 +24,7 @@ from ...display import NotebookResult, format_count, format_rounds
 from ...files import Whole, unknown_name
 from ...mechanisms import Parameters, find_mechanism
 from ...numerics.continuation import Evaluation
-from ...run import compute_outputs, takes_published
+from ...run import Inputs, compute_outputs, takes_published
 from ...units import RAD_S_PER_RPM
 from . import discretisation, kernels
 from .discretisation import Discretisation, Ends, OperatingPoint, OrbitError, Stations, operating_point, orbit_error
@@ -332,6 +332,11 @@ class PeriodicOrbit(NotebookResult):
         if status != Status.DONE:
             raise orbit_error(status, self.flow, self.start)
         return rows
+
+    @property
+    def run_inputs(self) -> Inputs:
+        """Inputs that give a run the drive of this motion."""
+        return self.drive.inputs(self.point.mechanism)
 
     def turn(self, samples: int | None = None) -> Turn:
         """Return the outputs over one period at equal steps of the crank angle, by default `SAMPLES` per turn of the crank."""
