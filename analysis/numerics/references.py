@@ -37,14 +37,20 @@ class _Fields(AttributeTemplate):  # type: ignore[misc]
 
     def generic_resolve(self, reference: Reference, name: str) -> Any:
         fields = reference.dtype.fields
-        return reference.dtype[fields.index(name)] if name in fields else None
+        if name not in fields:
+            return None
+        kind = reference.dtype[fields.index(name)]
+        return Reference(kind) if isinstance(kind, types.NamedTuple) else kind
 
 
 @lower_getattr_generic(Reference)
 def _field(context: Any, builder: Any, reference: Reference, value: Any, name: str) -> Any:
     place = reference.dtype.fields.index(name)
-    found = builder.load(cgutils.gep_inbounds(builder, value, 0, place))
-    return impl_ret_borrowed(context, builder, reference.dtype[place], found)
+    found, kind = cgutils.gep_inbounds(builder, value, 0, place), reference.dtype[place]
+    # a tuple within the tuple is passed by reference, too
+    return (
+        found if isinstance(kind, types.NamedTuple) else impl_ret_borrowed(context, builder, kind, builder.load(found))
+    )
 
 
 @intrinsic

@@ -237,7 +237,6 @@ def _integrate(
     own, recorded = batch._replace(laws=batch.laws.copy()), k.Samples(settings.times, states, forces)
     watch = k.watch_nothing(mechanism.size)
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
-    fits = _fits(batch, settings)
     code = machine(mechanism, switched, LANES).addresses
     runs = problem, source, own, watch, state, recorded, status, settings.max_steps
     there = None
@@ -248,8 +247,8 @@ def _integrate(
     while todo.any() and not interrupts:
         if there is not None:
             there.advance()
-        elif (todo & fits).any():
-            lanes.run_in_lanes(code, fits, *runs, STEPS_PER_CALL)
+        elif LANES > 1:
+            lanes.run_in_lanes(code, *runs, STEPS_PER_CALL)
         else:
             compiled.run(*runs, STEPS_PER_CALL)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
@@ -272,18 +271,6 @@ def _integrate(
     ends[:, :5] = np.column_stack([status, counts, ended, carries["lost"], steps])
     ends[:, 5:] = np.column_stack([state.x, state.u])
     return not todo.any()
-
-
-def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
-    """Return which runs can be solved in vector lanes: those whose inputs are constant, or held, in each interval.
-
-    Unless the inputs are held, runs with harmonics, motors, torsion bars, users' functions, or ramps of other inputs than
-    commanded speeds are solved one by one.
-    """
-    from ..numerics.vectors import LANES
-
-    fits: NDArray[np.bool_] = (batch.steady & ~batch.laws[:, :, 2].any(axis=1)) | (settings.hold > 0.0)
-    return fits & (LANES > 1)
 
 
 # Start of a run

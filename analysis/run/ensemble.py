@@ -199,8 +199,7 @@ def simulate_many(
     threads of this process, or by the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask
     cluster, "loky" for processes.
 
-    Runs whose inputs are constant between jumps, or held, are integrated side by side in the vector lanes of the processor; all
-    other runs one after the other.
+    Runs are integrated side by side in the vector lanes of the processor.
 
     Parameters
     ----------

@@ -1,12 +1,11 @@
 """Solve runs of an ensemble in lanes: one run in each lane of the processor's vectors, with its own time, step size and end.
 
 The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
-a shorter one. When a run ends, its lane takes the next run. Beginning an interval of inputs and locating the limit of assembly
-is done by the functions for single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``. Arguments ``v``
-are the work arrays `Lanes`, arguments ``w`` the `Work`.
+a shorter one. When a run ends, its lane takes the next run. The functions for single runs begin an interval of inputs, evaluate
+inputs that change within it, and locate the limit of assembly and the release of a torsion bar.
 
-Only runs whose inputs are constant in each interval fit here; runs whose inputs must be evaluated at each stage are left to
-`compiled.run`.
+Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``. Arguments ``v`` are the work arrays `Lanes`, arguments
+``w`` the `Work`.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from ..numerics.vectors import LANES
 from .compiled import (
     BATCH,
     Batch,
+    _run_source,
     begin_interval,
     choose_first_size,
     lane_motion,
@@ -39,9 +39,22 @@ from .compiled import (
 )
 from .equations import CLEARANCE, DERIVATIVE
 from .locating import end_step, locate_events
-from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
-from .sources import ADDRESSES, SOURCE, Source
-from .stepping import STAGES, bounded_step_size, next_step_size, shorter_step_size, step_short_of_limit
+from .records import (
+    PROBLEM,
+    RUNNING,
+    SAMPLES,
+    STATE,
+    WATCH,
+    Problem,
+    Room,
+    Samples,
+    State,
+    Watch,
+    is_bar_released,
+    renew,
+)
+from .sources import ADDRESSES, SOURCE, Source, write_channels
+from .stepping import NODES, STAGES, bounded_step_size, next_step_size, shorter_step_size, step_short_of_limit
 from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpolate_in_lanes, stage_in_lanes
 
 
@@ -101,27 +114,94 @@ def _equation(which, x, out, v):
 
 
 @inner
-def _attempt(v):
-    """Take a step in all lanes, as `stepping.attempt` does, into ``v.y``; write the errors into ``v.error``."""
+def _end_of_step(lane, carry, v):
+    return carry.stop if v.last[lane] else carry.begin + (carry.elapsed + v.h[lane])
+
+
+@inner
+def _finite(lane, states, many):
+    for i in range(states):  # noqa: SIM110 - Numba compiles no generators
+        if not isfinite(many[LANES * i + lane]):
+            return False
+    return True
+
+
+class Work(NamedTuple):
+    """The arguments of `run_in_lanes`, and the work arrays that the functions for single runs need."""
+
+    problem: Problem
+    source: Source
+    batch: Batch
+    watch: Watch
+    state: State
+    samples: Samples
+    status: NDArray[np.int64]
+    room: Room
+
+
+@inline
+def _motion(i, w):
+    """Return a reference to run i as a `Motion`."""
+    return lane_motion(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
+
+
+@inner
+def _changing(v, w):
+    """Return whether the inputs of a lane change within its interval."""
+    for lane in range(LANES):  # noqa: SIM110 - Numba compiles no generators
+        if v.run[lane] >= 0 and w.state.carries[v.run[lane]].piece >= 0:
+            return True
+    return False
+
+
+@inner
+def _renew(share, x, v, w):
+    """Update the channels of all lanes to the states x at the fraction ``share`` of their steps."""
+    for lane in range(LANES):
+        i = v.run[lane]
+        if i >= 0 and w.state.carries[i].piece >= 0:
+            read_lane(lane, LANES, x, w.room.z)
+            read_lane(lane, LANES, v.u, w.room.inside)
+            carry = w.state.carries[i]
+            source = refer(_run_source(i, w.source, w.batch))
+            write_channels(carry.begin, carry.elapsed + share * v.h[lane], carry.piece, w.room.z, source, w.room.inside)
+            write_lane(lane, LANES, w.room.inside, v.u)
+
+
+@inner
+def _attempt(changing, v, w):
+    """Take a step in all lanes, as `stepping.attempt` does, into ``v.y``; write the errors into ``v.error``.
+
+    ``changing`` is the value of `_changing`.
+    """
     for s in range(1, STAGES):
         stage_in_lanes(s, v.x, v.k, v.h, v.y)
+        if changing:
+            _renew(NODES[s], v.y, v, w)
         _equation(DERIVATIVE, v.y, v.k[s], v)
     stage_in_lanes(STAGES, v.x, v.k, v.h, v.y)
     errors_in_lanes(v.x, v.y, v.k, v.h, v.scale, v.error)
+    if changing:
+        _renew(1.0, v.y, v, w)
 
 
 @inner
-def _make_interpolants(v):
+def _make_interpolants(changing, v, w):
     """Compute the interpolants of all lanes' steps."""
     for s in range(STAGES + 1, 16):
         stage_in_lanes(s, v.x, v.k, v.h, v.z)
+        if changing:
+            _renew(NODES[s], v.z, v, w)
         _equation(DERIVATIVE, v.z, v.k[s], v)
     interpolants_in_lanes(v.x, v.y, v.k, v.h, v.f)
+    if changing:
+        _renew(1.0, v.y, v, w)
 
 
 @inner
-def _sample(samples, state, v):
+def _sample(v, w):
     """Record the samples inside the accepted steps of all lanes."""
+    samples, state = w.samples, w.state
     while True:
         more = False
         for lane in range(LANES):
@@ -140,31 +220,20 @@ def _sample(samples, state, v):
             if v.outcome[lane] == _SAMPLED:
                 i = v.run[lane]
                 carry = state.carries[i]
-                copy(v.between[lane], samples.states[i, carry.sample])
-                copy(state.u[i], samples.forces[i, carry.sample])
+                n = carry.sample
+                copy(v.between[lane], samples.states[i, n])
+                copy(state.u[i], samples.forces[i, n])
+                renew(samples.times[n] - carry.begin, v.between[lane], samples.forces[i, n], _motion(i, w))
                 carry.sample += 1
 
 
 @inner
-def _end_of_step(lane, carry, v):
-    return carry.stop if v.last[lane] else carry.begin + (carry.elapsed + v.h[lane])
-
-
-@inner
-def _finite(lane, states, many):
-    for i in range(states):  # noqa: SIM110 - Numba compiles no generators
-        if not isfinite(many[LANES * i + lane]):
-            return False
-    return True
-
-
-@inner
-def _judge(lane, error, carry, samples, v):
-    """Return the outcome of a lane's step; ``error`` is relative to the tolerance."""
-    clearance, states = v.clearance[lane], v.x.shape[0] // LANES
-    if not error <= 1.0 or isnan(clearance) or not _finite(lane, states, v.y):
+def _judge(lane, error, carry, ends, samples, v):
+    """Return the outcome of a lane's step; ``error`` is relative to the tolerance, ``ends`` says whether an event is inside."""
+    states = v.x.shape[0] // LANES
+    if not error <= 1.0 or isnan(v.clearance[lane]) or not _finite(lane, states, v.y):
         return _REJECTED
-    inside = clearance < LIMIT_SINE or (
+    inside = ends or (
         carry.sample < samples.times.shape[0] and samples.times[carry.sample] < _end_of_step(lane, carry, v)
     )
     if (inside or not v.last[lane]) and not _finite(lane, states, v.k[STAGES]):
@@ -172,34 +241,14 @@ def _judge(lane, error, carry, samples, v):
     return _SAMPLED if inside else _ACCEPTED
 
 
-class Work(NamedTuple):
-    """The arguments of `run_in_lanes`, and the work arrays that the functions for single runs need."""
-
-    fits: NDArray[np.bool_]
-    problem: Problem
-    source: Source
-    batch: Batch
-    watch: Watch
-    state: State
-    samples: Samples
-    status: NDArray[np.int64]
-    room: Room
-
-
-@inline
-def _motion(i, w):
-    """Return a reference to run i as a `Motion`."""
-    return lane_motion(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
-
-
 @inner
 def _take_run(lane, first, most, v, w):
-    """Give a lane the next run, from index ``first`` on, that fits and has steps to take; return the index after this run.
+    """Give a lane the next run, from index ``first`` on, that has steps to take; return the index after this run.
 
     ``most`` is the largest number of steps of a run.
     """
     i, end = first, w.status.shape[0]
-    while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
+    while i < end and not (w.status[i] == RUNNING and w.state.carries[i].steps < most):
         i += 1
     if i == end:
         return end
@@ -227,6 +276,14 @@ def _enter(lane, v, w):
 
 
 @inner
+def _leave(lane, v, w):
+    """Write the state and the inputs of a lane's run back into ``w.state``."""
+    i = v.run[lane]
+    read_lane(lane, LANES, v.x, w.state.x[i])
+    renew(w.state.carries[i].elapsed, w.state.x[i], w.state.u[i], _motion(i, w))
+
+
+@inner
 def _fill(first, most, v, w):
     """Bring each lane to the beginning of a step; return how many lanes have a step, and the index of the next run."""
     busy = 0
@@ -243,7 +300,7 @@ def _fill(first, most, v, w):
                 if w.state.carries[v.run[lane]].steps < most:
                     busy += 1
                     break
-                read_lane(lane, LANES, v.x, w.state.x[v.run[lane]])
+                _leave(lane, v, w)
                 v.run[lane] = -1
     return busy, first
 
@@ -279,18 +336,21 @@ def _choose_sizes(v, w):
 
 
 @inner
-def _end_at_limit(lane, v, w):
-    """End a lane's run at the limit of assembly, which lies inside its step."""
+def _end_at_event(lane, v, w):
+    """End a lane's step at the limit of assembly, which ends the run, or at the release of a torsion bar, inside the step."""
     i, h = v.run[lane], v.h[lane]
     read_lane(lane, LANES, v.x, w.state.x[i])
-    read_lane(lane, LANES, v.y, w.room.y)
+    read_lane(lane, LANES, v.u, w.state.u[i])
     for s in range(STAGES + 1):
         read_lane(lane, LANES, v.k[s], w.room.k[s])
     motion = _motion(i, w)
     what, cut = locate_events(v.clearance[lane], h, motion)
     sample_step(motion.carry.begin + (motion.carry.elapsed + cut * h), h, motion)
     w.status[i] = end_step(what, cut, h, motion)
-    v.run[lane] = -1
+    motion.carry.midway = 0
+    v.phase[lane] = _BETWEEN
+    if w.status[i] != RUNNING:
+        v.run[lane] = -1
     v.outcome[lane] = _IDLE
 
 
@@ -303,16 +363,20 @@ def _decide(lane, least, v, w):
     i, h = v.run[lane], v.h[lane]
     carry = w.state.carries[i]
     error = v.error[lane] / w.problem.tolerance
-    v.outcome[lane] = _judge(lane, error, carry, w.samples, v)
+    read_lane(lane, LANES, v.y, w.room.y)
+    ends = v.clearance[lane] < LIMIT_SINE or is_bar_released(w.room.y, _motion(i, w))
+    v.outcome[lane] = _judge(lane, error, carry, ends, w.samples, v)
     if v.outcome[lane] != _REJECTED:
         carry.step = next_step_size(h, carry.step, error)
-        if v.clearance[lane] < LIMIT_SINE:
-            _end_at_limit(lane, v, w)
+        if ends:
+            _end_at_event(lane, v, w)
         return
     carry.rejected += 1
     carry.step = shorter_step_size(h, error)
+    _leave(lane, v, w)
+    write_lane(lane, LANES, w.state.u[i], v.u)
     if not carry.step >= least:
-        read_lane(lane, LANES, v.x, w.state.x[i])
+        read_lane(lane, LANES, v.k[0], w.room.k[0])
         w.status[i] = short_step_status(h, _motion(i, w))
         v.run[lane] = -1
 
@@ -347,8 +411,9 @@ def _run(lanes, work, most, budget):
         if busy == 0:
             return
         budget -= busy
+        changing = _changing(v, w)
         _choose_sizes(v, w)
-        _attempt(v)
+        _attempt(changing, v, w)
         _equation(CLEARANCE, v.y, v.clearance, v)
         _equation(DERIVATIVE, v.y, v.k[STAGES], v)
         looking = False
@@ -357,22 +422,22 @@ def _run(lanes, work, most, budget):
                 _decide(lane, least, v, w)
                 looking |= v.outcome[lane] == _SAMPLED
         if looking:
-            _make_interpolants(v)
-            _sample(w.samples, w.state, v)
+            _make_interpolants(changing, v, w)
+            _sample(v, w)
         for lane in range(LANES):
             if v.outcome[lane] == _ACCEPTED:
                 _accept_step(lane, v, w)
     for lane in range(LANES):
         if v.run[lane] >= 0:
-            read_lane(lane, LANES, v.x, w.state.x[v.run[lane]])
+            _leave(lane, v, w)
 
 
 @kernel(
-    types.void(ADDRESSES, types.boolean[::1], PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
+    types.void(ADDRESSES, PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
     purpose="the solver of ensembles",
 )
-def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, status, most, budget):
-    """Integrate the runs of a batch for which ``fits`` is true and whose status is RUNNING, several at once.
+def run_in_lanes(code, problem, source, batch, watch, state, samples, status, most, budget):
+    """Integrate the runs of a batch whose status is RUNNING, several at once.
 
     ``code`` are the addresses of the equations in lanes, see `equations.machine`; the other arguments are those of
     `compiled.run`.
@@ -382,4 +447,4 @@ def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, stat
     v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
     for lane in range(LANES):
         write_lane(lane, LANES, problem.modes, v.modes)
-    _run(v, Work(fits, problem, source, batch, watch, state, samples, status, room), most, budget)
+    _run(v, Work(problem, source, batch, watch, state, samples, status, room), most, budget)
