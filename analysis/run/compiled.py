@@ -369,7 +369,7 @@ def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float
     return Batch(p[None], scale[None], np.array([steady]), np.array(sizes), *(values[None] for values in inputs))
 
 
-@part
+@inline
 def _run_source(i, source, batch):
     """Return the inputs of run i of a batch as a `Source`; ``source`` has the data common to all runs."""
     pieces, waves = batch.sizes[i]
