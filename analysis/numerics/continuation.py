@@ -245,6 +245,8 @@ class Follower:
     residual : callable, optional
         G alone, if the derivatives cost much more. Broyden's method then corrects the points, starting from the derivatives
         at the last point.
+    foreign : callable, optional
+        Receives the ``data`` of each new point; returns whether the point lies on another curve. The step is then shortened.
     """
 
     def __init__(
@@ -253,11 +255,12 @@ class Follower:
         scale: ArrayLike,
         settings: Settings,
         residual: Callable[[Vector, float], Vector] | None = None,
+        foreign: Callable[[Any], bool] | None = None,
     ) -> None:
         self.evaluate = evaluate
         self.settings = settings
         self.scale = np.append(np.asarray(scale, dtype=float), settings.high - settings.low)
-        self.residual = residual
+        self.residual, self.foreign = residual, foreign
         self.low, self.high = np.full(len(self.scale), -np.inf), np.full(len(self.scale), np.inf)
         for number, (low, high) in (*settings.bounds.items(), (-1, (settings.low, settings.high))):
             self.low[number], self.high[number] = low, high
@@ -436,6 +439,8 @@ class Follower:
             return _Failure(Reason.TIP, "the curve meets another")
         if found.corrections > HARD + 2 or away > REACH * length:
             return _Failure(Reason.TIP, "the corrections are many")
+        if self.foreign is not None and self.foreign(point.data):
+            return _Failure(Reason.TIP, "the corrections lead to another curve")
         return point, found.corrections
 
     def _step(self, point: Point, length: float, bend: Vector | None = None) -> _Landing | _Failure:

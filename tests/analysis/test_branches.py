@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis import figures, periodic
 from analysis.numerics.continuation import ContinuationError, Follower
 from analysis.periodic import Branch, Crossing, Drive, Family, Stability, find_orbit, follow, switch
-from analysis.periodic.response.branch import _turn_columns
+from analysis.periodic.response.branch import _repeats_early, _turn_columns
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -125,6 +125,15 @@ def test_a_doubled_branch_ends_where_it_meets_that_of_half_the_period(upper: Bra
     assert back.parameter[-1] == pytest.approx(doubling.parameter, rel=1e-3)
     assert [s.kind for s in back.special] == [Crossing.PERIOD_DOUBLING]
     assert back.special[0].parameter == pytest.approx(again.parameter, rel=1e-9)
+
+
+def test_a_motion_of_one_turn_does_not_pass_for_one_of_several(upper: Branch) -> None:
+    """A branch of 8 turns went on as the motion of one turn, which was then one of several stable motions."""
+    doubling = next(s for s in upper.special if s.kind is Crossing.PERIOD_DOUBLING)
+    doubled = switch(upper.family, doubling, low=850.0 * RPM, high=1300.0 * RPM, most_points=3).orbits[-1]
+    assert not _repeats_early(doubled)
+    assert all(_repeats_early(replace(upper.orbits[0], turns=turns)) for turns in (2, 3, 6))
+    assert _repeats_early(replace(doubled, turns=4))
 
 
 def test_one_switches_at_period_doublings_and_branch_points_only(softened: Branch) -> None:

@@ -123,6 +123,25 @@ def test_an_oriented_curve_ends_where_it_meets_another() -> None:
         assert result.points[-1].parameter == pytest.approx(0.0 if oriented else 1.0, abs=1e-3)
 
 
+def test_a_step_onto_another_curve_is_shortened() -> None:
+    """From a trough of a wave the first step leads onto the line below, unless ``foreign`` tells the two apart."""
+
+    def wave(b: float) -> float:
+        return 1e-3 * float(1.0 - 0.9 * np.cos(314.0 * b))
+
+    def wave_and_line(y: np.ndarray, b: float) -> Evaluation:
+        v, rise = float(y[0]), 1e-3 * 0.9 * 314.0 * np.sin(314.0 * b)
+        value, by_y = v * (v - wave(b)), 2.0 * v - wave(b)
+        return Evaluation(np.array([value]), np.array([[by_y]]), np.array([-v * rise]), abs(v) < 1e-9)
+
+    least = {}
+    for foreign in (None, bool):
+        f = Follower(wave_and_line, [1.0], Settings(low=0.0, high=0.1, first=0.1, greatest=0.1), foreign=foreign)
+        least[foreign] = min(float(p.y[0]) for p in f.follow(f.start([1e-4], 0.0, 1)).points)
+    assert least[None] == pytest.approx(0.0, abs=1e-9)
+    assert least[bool] == pytest.approx(1e-4, rel=1e-6)
+
+
 def test_the_most_points_are_reported() -> None:
     f = follower(CUBIC, -1.0, 1.0, most_points=7)
     result = f.follow(f.start([-1.3], -1.0, 1))

@@ -44,6 +44,9 @@ _BEGINNINGS = {
     Crossing.PERIOD_DOUBLING: (2, (2e-3, 8e-3, 5e-4, 3.2e-2)),
     Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),
 }
+#: Change of y over a part of the period, relative to the scale, below which the motion repeats itself after this part, and the
+#: parts: the period divided by each of these numbers.
+_REPEATED, _PARTS = 1e-6, (2, 3, 5, 7)
 #: A branch ends when the clearance to the limit of assembly (a sine, as `LIMIT_SINE`) falls below the first value, or when its
 #: largest multiplier exceeds the second value.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
@@ -355,7 +358,7 @@ def _follower(
     sizes: NDArray[np.float64] | float = 1.0,
 ) -> Follower:
     equations = OrbitEquations(family, orbit.turns, settings.low, settings.high, angles)
-    return Follower(equations, equations.scale(orbit.start) * sizes, settings)
+    return Follower(equations, equations.scale(orbit.start) * sizes, settings, foreign=_repeats_early)
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
@@ -475,8 +478,23 @@ def _meets_half(before: Point, after: Point) -> bool:
 
 def _half_shift(point: Point, scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the change of y, relative to a scale, over half of the period."""
-    orbit: PeriodicOrbit = point.data
-    return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / scale)
+    return _shift(point.data, point.data.turns // 2, scale)
+
+
+def _shift(orbit: PeriodicOrbit, turns: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the change of y, relative to a scale, over a number of common periods from the start of an orbit."""
+    return np.asarray(orbit.point.period(orbit.start, turns).shift / scale)
+
+
+def _repeats_early(orbit: PeriodicOrbit) -> bool:
+    """Return whether a motion repeats itself after a whole part of its period already, and so belongs to another branch."""
+    try:
+        return any(
+            orbit.turns % part == 0 and np.abs(_shift(orbit, orbit.turns // part, orbit.scale)).max() < _REPEATED
+            for part in _PARTS
+        )
+    except OrbitError:
+        return False
 
 
 def _test_value(point: Point, kind: Crossing, sign: float = 1.0) -> float:
