@@ -30,7 +30,7 @@ _BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
 #: If a curve has more oscillations than this, a band is drawn instead; greatest number of parts of the band; note about it.
 _FAST, _BANDS = 120, 200
 BANDS = "Band: range of an oscillation that is too fast to be drawn; its line is the mean."
-#: Range of many runs, relative to the range of 90 % of them, above which the axis is cut off.
+#: The axis is cut off if the values of all runs span more than this many times the range of 90 % of the runs.
 _FAR = 10.0
 #: Number of the picture of the mechanism among the numbers of panels.
 _DRAWN = -1

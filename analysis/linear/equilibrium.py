@@ -240,7 +240,10 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Return the magnitude, in units of energy (N.m), of the generalised forces that have to balance each other."""
+        """Return the sum of the magnitudes of all generalised forces near q times the scales of their coordinates (N.m).
+
+        An imbalance is small or large relative to this value. ``of_inputs`` are the forces due to unit inputs.
+        """
         # a cyclic freedom has no displacement that loads a spring
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)

@@ -285,7 +285,11 @@ def _leave(lane, v, w):
 
 @inner
 def _fill(first, most, v, w):
-    """Bring each lane to the beginning of a step; return how many lanes have a step, and the index of the next run."""
+    """Bring each lane to the beginning of a step of its run, or leave it empty if no runs are left.
+
+    ``first`` is the index of the next run, ``most`` the greatest number of steps of a run, v the work space of the lanes.
+    Return how many lanes are not empty, and the index of the next run then.
+    """
     busy = 0
     for lane in range(LANES):
         v.outcome[lane] = _IDLE

@@ -36,8 +36,8 @@ COUPLINGS = {
 #: Controller of the communication step: proportional and integral gain; least and greatest growth of a step; least and greatest
 #: step relative to the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
-#: Decay per step of the power to which residuals are compared: this power remembers some fifty steps, so that instants
-#: without power do not matter.
+#: Residuals are compared with the transmitted power, or with its last greater value, which decays by this factor in each step:
+#: at an instant without power the value of up to some fifty steps ago counts.
 _MEMORY = 0.98
 #: Largest number of rounds in which the values of algebraic loops may settle at the start.
 _ROUNDS = 100
@@ -202,7 +202,11 @@ class _Instances:
     def _exchange(
         self, outputs: Floats, slopes: Floats | None = None, *, middle: float = 0.0, updated: bool = False
     ) -> None:
-        """Set all connected inputs; a part that accepts no slopes receives the values ``middle`` (s) after the step begins."""
+        """Set all connected inputs from ``outputs``, the values at the start of a step, and the inputs' slopes over time.
+
+        A part that accepts no slopes receives the values extrapolated by the time ``middle`` (s). With ``updated`` an FMI 3.0
+        part receives the extrapolated value at each step of its own integrator.
+        """
         values = outputs[self.sources]
         for name, (ports, numbers) in self.own.items():
             own = None if slopes is None else slopes[numbers]

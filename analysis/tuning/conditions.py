@@ -192,7 +192,10 @@ class PickedMotion:
 
 
 class TrackedMotion:
-    """A motion that the equation ``row`` picks from its branch, found again from a known spot as the parameters change."""
+    """A motion on a branch, picked by the further equation ``row``, that is found again after the parameters have changed.
+
+    The search begins at ``spot``, the motion that was found last.
+    """
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.wish, self.row = wish, row
@@ -418,7 +421,10 @@ class OutputBelow(Condition):
         self._known: tuple[bytes, PickedMotion, Turn] | None = None
 
     def _motion_and_turn(self, x: FloatArray) -> tuple[PickedMotion, Turn]:
-        """Return the motion at the level at which the output is greatest, found by parabolas, and its outputs over a period."""
+        """Return the motion of the range that has the greatest maximum of the output, and this motion's outputs over a period.
+
+        ``x`` are the changes in units of the tolerances. The level of the motion is found by parabolas.
+        """
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
         found, value = self._reading(x, self._last.level)

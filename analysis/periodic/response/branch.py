@@ -36,10 +36,11 @@ from ..stability.nonlinear import SpecialPoint
 _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
 #: Distance of a multiplier, or of the product of two multipliers, from 1 below which the distance is a rounding error.
 _AT_CROSSING = 1e-8
-#: Greatest distance of the first motion of a branch from the point at which it begins, relative to the range and to the scale.
+#: Greatest distance between the point at which a branch begins and the first motion of the branch: in the parameter relative to
+#: its range, in y relative to the scale of y.
 BEGINNING = 0.05
 #: For each kind of point at which a branch begins: period of the branch's motions relative to the period at the point, and
-#: distances from the point at which the first motion is sought, relative to the crank's length.
+#: lengths of the first step from the point, in scaled arc length, that are tried in this order.
 _BEGINNINGS = {
     Crossing.PERIOD_DOUBLING: (2, (2e-3, 8e-3, 5e-4, 3.2e-2)),
     Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),

@@ -35,7 +35,8 @@ _POINTS, _PANELS, _HALVINGS = 8, 32, 40
 #: Size of the last Legendre coefficients over a panel above which the panel is halved: for the rates and their derivatives, in
 #: the scale of y; for the effect of a parameter on the rates, relative to its greatest value.
 _RESOLVED, _EFFECT = 1e-10, 1e-8
-#: Jump of these quantities between two neighbouring panels, in units as above, above which both panels are halved.
+#: Jump of the rates, of their derivatives or of the effect of a parameter between two neighbouring panels, relative to the same
+#: scales, above which both panels are halved.
 _CONTINUOUS = 1e-8
 #: A panel has a kink if it is shorter than ``_KINK`` (rad) and if the derivatives of the rates change over it by more than
 #: ``_STEEP`` times their greatest value times the square root of its length. The square root is allowed because rates may have

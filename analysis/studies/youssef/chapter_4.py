@@ -238,7 +238,7 @@ def compute_first() -> StudyResult:
 
 
 def ten_harmonics(inertia_ratio: float) -> FloatArray:
-    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVERY`, at omega_c `COMPARED_AT`."""
+    """Return the amplitudes of harmonics 0 to `MANY` of zeta (no unit), a row for each speed of `EVERY`, at `COMPARED_AT`."""
     motions = (linear(speed, inertia_ratio, COMPARED_AT, harmonics=MANY) for speed in EVERY.tolist())
     return np.array([motion.series.amplitudes for motion in motions])
 

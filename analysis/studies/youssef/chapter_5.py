@@ -213,7 +213,7 @@ def judge_homogeneous_part() -> tuple[Case, ...]:
 
 
 def change_by_force(with_force: SliderEquation) -> float:
-    """Return by how much the force of a linear equation changes its Floquet multipliers."""
+    """Return the greatest change of a Floquet multiplier of a linear equation by its force, a modulus without unit."""
     without = with_force.homogeneous().stiffened(with_force.spring)
 
     def derivative(t: float, y: FloatArray) -> list[float]:

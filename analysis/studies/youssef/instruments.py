@@ -18,7 +18,7 @@ from .rigs import LOST, rig, turn
 
 #: Number of holes in the disc, and moments of inertia (kg.m2) that we assume for the crank with its flywheels: none is printed.
 HOLES, INERTIAS = 60, (5e-3, 2e-2)
-#: Crank speed (rpm).
+#: Mean crank speed in the test of the photocell (rpm).
 PULSED = 420.0
 
 

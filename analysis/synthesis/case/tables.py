@@ -250,9 +250,9 @@ class _Curve(_ObjectiveAndRange):
         return found, closed if self.closed is None else self.closed
 
     def _timed_points(self, folder: Path, *given: Any) -> FloatArray:
-        """Return the points in m; the last point of a file, if it repeats the first, is kept only if ``given`` has its value.
+        """Return the points in m; a closed curve from a file ends at its first point if ``given`` has a value for this end.
 
-        ``given`` are crank rotations, as `Steps` or a list, and a list of angles; each may be None.
+        ``given`` are the values for each point: crank rotations, as `Steps` or a list, and a list of angles; each may be None.
         """
         if self.points is not None:
             _refuse_entries(self, ("closed",), "file or task.x, in tasks with crank rotations")

@@ -261,9 +261,9 @@ _DEPENDENT_POSES = (
 
 
 def _null_space(rows: FloatArray, size: int) -> FloatArray:
-    """Return a basis of the null space of the matrix ``rows`` as columns; ``size`` is their number.
+    """Return a basis of the null space of the matrix ``rows``: ``size`` columns.
 
-    Raises InputError if the rows are linearly dependent, so that the null space has more dimensions.
+    Raises InputError if the rows are linearly dependent, so that the null space has more than ``size`` dimensions.
     """
     _, values, right = np.linalg.svd(rows)
     if values[-1] < INDEPENDENT * values[0]:
@@ -453,7 +453,10 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _pivot_line(row: FloatArray, z: complex) -> FloatArray:
-    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot m of a point z; a, b and c are linear in z."""
+    """Return (a, b, c) of the line a mx + b my + c = 0 on which the pivot m of the moving point z lies, for one pose.
+
+    ``row`` is the pose's row of `_conditions`; a, b and c are linear in z.
+    """
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
     return np.array([row[3] - turned.real, row[4] - turned.imag, constant])

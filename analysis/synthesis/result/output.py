@@ -292,7 +292,8 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     )
 
 
-#: Letters of the line with which a further position shows the coupler in addition to B -> C, by the result of `_coupler_line`.
+#: Points of the polyline that shows the coupler of a further position in addition to A-B-C-D, for each result of
+#: `_coupler_line`; empty if B-C shows the whole coupler.
 _BESIDE = {"": "BPC", "BC": "", "BP": "CP", "PC": "BP"}
 
 

@@ -184,7 +184,7 @@ class Refinement:
         self.program, normal = program, program.normal
         self.normal = normal
         assert normal.outline is not None
-        #: Bound of the greatest distance, if the program minimises something else; otherwise None.
+        #: Bound of the greatest distance from the target (m) if another function is minimised; else None.
         self.limit = program.least.error if program.objective == "least curve" else None
         self._target = TargetPath(points=_coordinates(normal.outline).T, closed=normal.closed)
         self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)

@@ -326,11 +326,11 @@ class Program(Statement):
 
     @property
     def greatest_value_index(self) -> int:
-        """Return the index of the unknown that bounds the function that is minimised instead of an error."""
+        """Return the index of the unknown that bounds the minimised function, such as the greatest pin force, from above."""
         return len(self.low) - len(self._initial)
 
     def greatest_value(self, start: Start) -> float:
-        """Return the greatest value, at a start, of the function that is minimised instead of an error."""
+        """Return the greatest value over the rotations, at a start, of the minimised function, such as a pin force."""
         return float(np.asarray(self._initial_values(*self.unknowns_and_parameters(start))).ravel()[0])
 
     def unknowns_and_parameters(

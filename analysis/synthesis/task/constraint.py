@@ -303,7 +303,7 @@ class Demand:
         return False
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the functions of the dimensions that must be at most zero, or equal to zero."""
+        """Return the functions of the dimensions that must be at most zero, or zero, for the crank rotations ``way``."""
         raise NotImplementedError
 
     def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction | None:
