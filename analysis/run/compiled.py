@@ -370,7 +370,7 @@ def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float
 
 
 @inline
-def _run_source(i, source, batch):
+def run_source(i, source, batch):
     """Return the inputs of run i of a batch as a `Source`; ``source`` has the data common to all runs."""
     pieces, waves = batch.sizes[i]
     return Source(
@@ -388,7 +388,7 @@ def _run_source(i, source, batch):
 def lane_motion(i, problem, source, batch, watch, samples, room, state):
     """Return a reference to run i of a batch as a `Motion`."""
     return refer(Motion(
-        problem, batch.p[i], batch.scales[i], batch.steady[i], _run_source(i, source, batch), watch,
+        problem, batch.p[i], batch.scales[i], batch.steady[i], run_source(i, source, batch), watch,
         Samples(samples.times, samples.states[i], samples.forces[i]), room, state.carries[i], state.x[i], state.u[i],
     ))  # fmt: skip
 
@@ -397,7 +397,7 @@ def lane_motion(i, problem, source, batch, watch, samples, room, state):
 def channels_of_many(t, source, batch, x, u):
     """Compute the input channels of each run of a batch at time t: row i of u receives those at the state in row i of x."""
     for i in range(x.shape[0]):
-        own = _run_source(i, source, batch)
+        own = run_source(i, source, batch)
         write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])
 
 

@@ -26,13 +26,13 @@ from ..numerics.vectors import LANES
 from .compiled import (
     BATCH,
     Batch,
-    _run_source,
     begin_interval,
     choose_first_size,
     lane_motion,
     make_room,
     next_size,
     read_lane,
+    run_source,
     sample_step,
     short_step_status,
     write_lane,
@@ -163,7 +163,7 @@ def _renew(share, x, v, w):
             read_lane(lane, LANES, x, w.room.z)
             read_lane(lane, LANES, v.u, w.room.inside)
             carry = w.state.carries[i]
-            source = refer(_run_source(i, w.source, w.batch))
+            source = refer(run_source(i, w.source, w.batch))
             write_channels(carry.begin, carry.elapsed + share * v.h[lane], carry.piece, w.room.z, source, w.room.inside)
             write_lane(lane, LANES, w.room.inside, v.u)
 
