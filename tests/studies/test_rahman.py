@@ -431,7 +431,8 @@ class TestMethod:
         missed, wrong = (case.computed for case in statement("rahman-closure", "The approach is developed").cases)
         # rounding decides at a few of the shifts, such as 10 in at a4 = 20 in
         assert missed == pytest.approx(67.0 / 82.0, abs=2.5 / 82.0)
-        assert missed + wrong == pytest.approx(78.0 / 82.0)
+        # each of the two is rounded to two digits
+        assert missed + wrong == pytest.approx(78.0 / 82.0, abs=0.01)
 
     @pytest.mark.long
     @pytest.mark.parametrize(
@@ -440,10 +441,13 @@ class TestMethod:
     def test_share_of_poor_starts_at_which_rounding_decides(self, cases: tuple[Case, ...], share: float) -> None:
         poor = (-120.0, -60.0, 60.0, 120.0, 180.0)
         starts = (tuple(x + off for x in poor) for off in (0.0, 1e-10))
-        one, other = (np.concatenate([found.settled for found in iteration.endings(cases, start)]) for start in starts)
+        ends = [iteration.endings(cases, start) for start in starts]
+        one, other = (np.concatenate([found.settled for found in end]) for end in ends)
         assert np.mean(one != other) == pytest.approx(share, abs=0.02)
         # by the rounding of another machine it is 0.021
         assert np.mean(one) == pytest.approx(np.mean(other), abs=0.03)
+        before, after = (np.concatenate([found.unknowns[:, 4] for found in end]) for end in ends)
+        assert np.mean(one & other & (np.abs(after - before) > 1e-3)) == pytest.approx(0.24, abs=0.03)
 
     @pytest.mark.slow
     @pytest.mark.parametrize(

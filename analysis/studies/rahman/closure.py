@@ -272,9 +272,10 @@ def _mechanism_limits() -> Iterator[Statement]:
         "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
         "from another at the joint or the slider will go to the opposite side.",
         place,
-        "margin of the rod's reach, the least over a turn. First with S1 larger than its greatest value by 1 in, our "
-        "choice: the margin is negative where the loop cannot close. Then at the greatest S1, the greatest margin of "
-        "the four offsets: it is zero where the two assemblies meet, so that the slider can go to the opposite side",
+        "margin of the rod's reach (rod length minus distance of the crank pin from the guide), the least over a turn. "
+        "First with S1 larger than its greatest value by 1 in, our choice: the margin is negative where the loop cannot "
+        "close. Then at the greatest S1, the greatest margin of the four offsets: it is zero where the two assemblies "
+        "meet, so that the slider can go to the opposite side",
         f"none, the sign decides; for zero {ROUNDING}",
         *(
             at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
