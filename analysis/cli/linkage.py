@@ -73,7 +73,10 @@ def _print_structure(package: Package) -> None:
         else:
             freedom = package.interface.drives[step.freedom]
             driven = f", driven as {freedom.table}" if freedom.table else ""
-            rows.append((step.body, f"freedom {freedom.name}", f"from {step.parent} at {step.joint.name}{driven}"))
+            if freedom.speed and not freedom.table:
+                driven = ", not driven: starts at its speed"
+            way = f", measured from {step.body} to {step.parent}" if step.sign < 0 else ""
+            rows.append((step.body, f"freedom {freedom.name}", f"from {step.parent} at {step.joint.name}{way}{driven}"))
     columns = ("body", "by", "joints")
     show_table("steps that compute the positions of the bodies", columns, rows)
 

@@ -1,5 +1,6 @@
 """`linkwork new`: what is written runs as it is, holds every entry there is, and its examples are taken."""
 
+import json
 import re
 import tomllib
 from math import pi
@@ -129,6 +130,16 @@ def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tm
     for kind in (Body, Slide, Slot, Gear, Rack, Spring, Description):
         for name in entry_names(kind):
             assert re.search(rf"\b{name}\b", text), (kind, name)
+
+
+def test_a_linkage_says_how_an_angle_is_measured_and_which_speed_is_only_that_at_the_start(linkwork, tmp_path):
+    arm = {"points": {"B": [0.0, 0.0]}, "mass": 1.0, "inertia": 0.1}
+    freedoms = {"crank": {"joint": "A", "speed": 30.0}, "swing": {"joint": "B", "speed": 5.0}}
+    parts = {"ground": {"A": [0.0, 0.0]}, "bodies": {"arm": arm, "crank": {"bar": ["A", "B"], "length": 0.1}}}
+    (tmp_path / "arm.json").write_text(json.dumps({"linkage": {"name": "arm-on-crank", **parts, "freedoms": freedoms}}))
+    said = " ".join(linkwork("linkage arm.json").output.split())
+    assert "from crank at B, measured from arm to crank, not driven: starts at its speed" in said
+    assert "from ground at A, driven as drive" in said
 
 
 @pytest.mark.slow
