@@ -47,11 +47,11 @@ class Picture:
             side, line = "" if slide.bodies[1] == rack.rack else "-", f"b.{slide.name}_line"
             x, y = (f"b.at_{pin.name}.{c} {s} {side}p.{name}_radius * {line}.{t}" for c, s, t in ("x+s", "y-c"))
             joints.append(PicturePoint(f"{name}Pitch", f"pitch point of {name}", f"*({x}, {y}, 0.0)"))
-            ends = {f"{name}Line": "-", f"{name}LineEnd": "+"}
-            for end, sign in ends.items():
-                x1, y1 = (f"{at} {sign} {0.5 * length!r} * {line}.{t}" for at, t in ((x, "c"), (y, "s")))
-                joints.append(PicturePoint(end, f"pitch line of {rack.rack}", f"*({x1}, {y1}, 0.0)"))
-            parts.append(f'Part("axis", {tuple(ends)!r}, "pitch line of {rack.rack}")')
+            ends = f"{name}Line", f"{name}LineEnd"
+            for end, sign in zip(ends, "-+"):
+                place = f"{x} {sign} {0.5 * length!r} * {line}.c, {y} {sign} {0.5 * length!r} * {line}.s"
+                joints.append(PicturePoint(end, f"pitch line of {rack.rack}", f"*({place}, 0.0)"))
+            parts.append(f'Part("axis", {ends!r}, "pitch line of {rack.rack}")')
             tick = f"arm(b.{rack.gear}_frame.turn, p.{name}_radius, 0.0)"
             joints.append(self.tick(name, rack.gear, pin.name, tick))
             parts.append(f'Part("gear", ("{pin.name}", "{name}{rack.gear}Tick"), "pitch circle of {rack.gear}")')
@@ -82,10 +82,7 @@ class Picture:
     def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
         """Return the name of the body that carries two gears, and the names of the pins that join the gears to this body."""
         step = next(s for s in self.structure.steps if isinstance(s, GearStep) and {s.body, s.mate} == set(bodies))
-        joints = [joint for joint in self.structure.joints.values() if isinstance(joint, Pin)]
-        return step.parent, tuple(
-            next(joint.name for joint in joints if {own, step.parent} <= set(joint.bodies)) for own in bodies
-        )
+        return step.parent, tuple(self.structure.common_pin(own, step.parent) for own in bodies)
 
     def positions(self) -> str:
         """Write the function that computes the positions of the picture's points."""

@@ -264,13 +264,9 @@ class Motion:
         yield function(f"forces({arguments}) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
 
     def _mate_force(self, step: GearStep) -> str:
-        pins = [
-            j
-            for j in self.structure.joints.values()
-            if isinstance(j, Pin) and {step.mate, step.parent} <= set(j.bodies)
-        ]
+        other = self.structure.common_pin(step.mate, step.parent)
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
-        return f"force_from_mate(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
+        return f"force_from_mate(b.at_{step.pin.name}, b.at_{other}, {ratio}, on_{step.body})"
 
     def _rack_force(self, step: RackStep) -> str:
         """Return the expression of the tooth force on the body of a step, a rack or a gear, from its mate."""
@@ -378,13 +374,17 @@ class Motion:
         yield self._jump(held)
         signature = f"start(x: {numbers}, i: Applied, p: Constants) -> {numbers}"
         yield function(signature, "Return the state at the start as it is.", ["return x"])
+        yield self._clearance(held)
+
+    def _clearance(self, held: str) -> str:
         rows, margin = ["b = places(x, p)"], "b.clearance"
         if self.description.friction:
             rows += ["if not p.rough:", "    return b.clearance", f"m, held_ones = masses(b, p), {held}"]
             rows.append(f"response = responses(b, m, rubbing(b, p), mass_matrix(m, {self.n}), held_ones, p)")
             margin = "lesser(b.clearance, jamming_margin(response))"
         doc = "Compute the least sine of the transmission angles of all dyads, or the margin to jamming if that is smaller."
-        yield function(f"clearance(x: {numbers}, i: Applied, p: Constants) -> float", doc, [*rows, f"return {margin}"])
+        signature = "clearance(x: tuple[float, ...], i: Applied, p: Constants) -> float"
+        return function(signature, doc, [*rows, f"return {margin}"])
 
     def _energies(self) -> Iterator[str]:
         terms = []

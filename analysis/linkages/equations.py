@@ -15,6 +15,13 @@ from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Side, Slider,
 from .writing import function, record
 
 
+class Linear(NamedTuple):
+    """An angle or a position that is linear in the coordinates: coefficients by index of the coordinate, constant terms."""
+
+    terms: dict[int, str]
+    constants: list[str]
+
+
 class PoseWriter:
     """Writer of the function that computes the poses of all bodies of one linkage.
 
@@ -27,10 +34,9 @@ class PoseWriter:
         self.lines: list[str] = []
         #: variables of the positions of points of the ground and of bodies with known pose, by name of the point
         self.places: dict[str, str] = {}
-        #: for each body whose angle is linear in the coordinates: the coefficients, and the constant terms
-        self.angles: dict[str, tuple[dict[int, str], list[str]]] = {GROUND: ({}, [])}
-        #: for each slide whose position is linear in the coordinates: the coefficients, and the constant terms
-        self.travels: dict[str, tuple[dict[int, str], list[str]]] = {}
+        #: angles of the bodies, and positions of the slides, that are linear in the coordinates
+        self.angles: dict[str, Linear] = {GROUND: Linear({}, [])}
+        self.travels: dict[str, Linear] = {}
         self.margins: list[str] = []
 
     # Places
@@ -81,8 +87,8 @@ class PoseWriter:
         parent_turn = f"{parent}.turn" if parent else f"fixed_direction(1.0, 0.0, {self.n})"
         turn = f"{step.body}_turn"
         joint, drive = step.joint, self.interface.drives[step.freedom]
-        terms, constants = (dict(self.angles[step.parent][0]), list(self.angles[step.parent][1]))
-        sign = "-" if step.sign < 0 else ""
+        parent_angle, sign = self.angles[step.parent], "-" if step.sign < 0 else ""
+        terms, constants = dict(parent_angle.terms), list(parent_angle.constants)
         if isinstance(joint, Pin):
             terms[step.freedom] = f"{sign}1.0"
             self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
@@ -95,9 +101,9 @@ class PoseWriter:
             if joint.inclined:
                 constants.append(f"{sign}p.{joint.name}_direction")
             if not lead:
-                self.travels[joint.name] = {step.freedom: "1.0"}, []
+                self.travels[joint.name] = Linear({step.freedom: "1.0"}, [])
             frame = self.slide_pose(step, joint, parent_turn, travel, own)
-        self.angles[step.body] = terms, constants
+        self.angles[step.body] = Linear(terms, constants)
         self.lines.append(f"{step.body}_{suffix} = {frame}")
 
     def slide_pose(
@@ -127,7 +133,7 @@ class PoseWriter:
             for number, factor in travel.items():
                 terms[number] = f"({terms.get(number, '0.0')} + {factor} / {radius})"
             constants = [*own_constants, f"({' + '.join((*start, f'-{offset}'))}) / {radius}"]
-            self.angles[step.body] = terms, constants
+            self.angles[step.body] = Linear(terms, constants)
             self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
         else:
             holder, block = step.slide.bodies
@@ -149,13 +155,13 @@ class PoseWriter:
         }
         angle = " + ".join(constants) or "0.0"
         start = [f"{radius} * ({angle} - ({' + '.join(own_constants) or '0.0'}))", offset]
-        self.travels[step.slide.name] = share, start
+        self.travels[step.slide.name] = Linear(share, start)
         way = " + ".join((*(f"{f} * {self.interface.drives[n].variable}" for n, f in share.items()), *start))
         travel = f"linear_arm({way}, {self.derivative_tuple(share)}, v)"
         frame = self.slide_pose(step, step.slide, self.interface.turn(step.parent), travel)
         sign = "" if step.slide.bodies[1] == step.body else "-"
         inclined = [f"{sign}p.{step.slide.name}_direction"] if step.slide.inclined else []
-        self.angles[step.body] = own_terms, [*own_constants, *inclined]
+        self.angles[step.body] = Linear(own_terms, [*own_constants, *inclined])
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def derivative_tuple(self, terms: dict[int, str]) -> str:
@@ -190,7 +196,7 @@ class PoseWriter:
         back = " + ".join(carrier_constants) or "0.0"
         angle = f"{back} + {factor} * ({seen} - ({back}){f' - {phase}' if step.inverse else ''})"
         constants = [angle if step.inverse else f"{angle} + {phase}"]
-        self.angles[step.body] = terms, constants
+        self.angles[step.body] = Linear(terms, constants)
         turn = f"{step.body}_turn"
         self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
         pin = self.point_variable(step.parent, step.pin.name)
@@ -209,7 +215,7 @@ class PoseWriter:
         elif side.joint.bodies[1] == side.body:
             start, axes = "", ""
         else:
-            start, axes = side.joint.through, side.joint.name if side.joint.inclined else ""
+            start, axes = side.joint.through, side.joint.axes
         return self.own_arm(side, body, joint.name, start, axes)
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
@@ -264,7 +270,7 @@ class PoseWriter:
         """Write the poses of the further bodies of both sides of a dyad, relative to the first body of their side."""
         for side in step.sides:
             kept = dict(self.angles)
-            self.angles[side.body] = {}, []
+            self.angles[side.body] = Linear({}, [])
             for inside in side.inside:
                 if isinstance(inside, FreedomStep):
                     self.place_freedom_body(inside, side.body)
@@ -323,11 +329,12 @@ class PoseWriter:
             self.point_variable(step.ends[0], name)
 
     def _place_between_pins(self, step: Dyad, inner: Slider, pins: list[str], branch: str, margin: str) -> None:
-        holder, block = (0, 1) if step.sides[0].body == inner.bodies[0] else (1, 0)
-        first, second = step.sides[holder], step.sides[block]
-        a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
+        sides = list(zip(step.sides, pins))
+        # body 1 of `pin_slide_pin` has the line, body 2 is the block
+        (first, pin), (second, other_pin) = sides if step.sides[0].body == inner.bodies[0] else sides[::-1]
+        a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.axes)
         b = self.own_arm(second, second.body, second.joint.name, "", "")
-        call = f"pin_slide_pin({pins[holder]}, {pins[block]}, {a}, {b}, {branch}, v)"
+        call = f"pin_slide_pin({pin}, {other_pin}, {a}, {b}, {branch}, v)"
         self.lines.append(f"{inner.name}_line, {inner.name}_along, {margin} = {call}")
         self.lines.append(f"{first.body}_turn = {self.incline_turn(f'{inner.name}_line', inner, -1)}")
         self.lines.append(f"{second.body}_turn = {inner.name}_line")
@@ -339,7 +346,7 @@ class PoseWriter:
         assert isinstance(outer, Slider)
         own = outer.bodies[1] == second.body
         turn = direction if own else self.incline_turn(direction, outer, -1)
-        start, axes = ("", "") if own else (outer.through, outer.name if outer.inclined else "")
+        start, axes = ("", "") if own else (outer.through, outer.axes)
         across = f"{inner.name}_line"
         holds = inner.bodies[0] == second.body
         self.lines.append(f"{across} = {self.incline_turn(turn, inner) if holds else turn}")
@@ -348,7 +355,7 @@ class PoseWriter:
             b = self.own_arm(second, second.body, inner.through, start, axes)
             body_turn = across
         else:
-            a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
+            a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.axes)
             b = self.own_arm(second, second.body, "", start, axes)
             body_turn = self.incline_turn(across, inner, -1)
         call = f"pin_slide_slide({pin}, {origin}, {direction}, {across}, {a}, {b}, v)"

@@ -169,10 +169,11 @@ def _finite(value: object) -> bool:
 
 def _table(rows: Sequence[Sequence[float]], name: str) -> str:
     """Return the expression of linear interpolation, extrapolated at both ends: a line plus terms in abs(x - x_k)."""
-    if any(b[0] <= a[0] for a, b in pairwise(rows)):
+    xs, (force, *_) = zip(*rows)
+    if any(after <= before for before, after in pairwise(xs)):
         raise ParameterError(name, [list(row) for row in rows], "have rows of rising x")
-    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(rows)]
-    bends = [(row[0], 0.5 * (after - before)) for row, before, after in zip(rows[1:], slopes, slopes[1:])]
+    slopes = [(f2 - f1) / (x2 - x1) for (x1, f1), (x2, f2) in pairwise(rows)]
+    bends = [(x, 0.5 * (after - before)) for x, before, after in zip(xs[1:], slopes, slopes[1:])]
     slope = 0.5 * (slopes[0] + slopes[-1])
-    level = rows[0][1] - slope * rows[0][0] - sum(bend * abs(rows[0][0] - x) for x, bend in bends)
+    level = force - slope * xs[0] - sum(bend * abs(xs[0] - x) for x, bend in bends)
     return " + ".join((f"{level!r} + {slope!r} * x", *(f"{bend!r} * fabs(x - {x!r})" for x, bend in bends)))

@@ -441,15 +441,12 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
         raise LinkageError(f"{where} is at {spring.at}: it must be at a joint of two bodies, {names}")
     about = isinstance(joint, Pin) or bool(spring.bodies)
     kind, unit = ("angle", "rad") if about else ("length" if spring.between else "position", "m")
-    of = (
-        f"{name}.length"
-        if spring.between
-        else drive.coordinate
-        if drive
-        else spring_angle_name(description, name)
-        if about
-        else f"{spring.at}.position"
-    )
+    if spring.between:
+        of = f"{name}.length"
+    elif drive:
+        of = drive.coordinate
+    else:
+        of = spring_angle_name(description, name) if about else f"{spring.at}.position"
     rows = (
         ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),
         ("damping", spring.damping, "N.m.s/rad" if about else "N.s/m", f"Viscous damping of {name}", "", "damping"),

@@ -36,6 +36,11 @@ class Slider(NamedTuple):
     through: str
     inclined: bool
 
+    @property
+    def axes(self) -> str:
+        """Return the name of the slide if its line is inclined, so that arms along it must be turned; else an empty text."""
+        return self.name if self.inclined else ""
+
 
 Joint = Pin | Slider
 
@@ -162,6 +167,11 @@ class Structure:
     joints: Mapping[str, Joint]
     freedoms: Mapping[str, FreedomTable]
     steps: tuple[Step, ...]
+
+    def common_pin(self, one: str, other: str) -> str:
+        """Return the name of the first pin that joins two bodies."""
+        pins = (joint for joint in self.joints.values() if isinstance(joint, Pin))
+        return next(pin.name for pin in pins if {one, other} <= set(pin.bodies))
 
     @property
     def dyads(self) -> tuple[Dyad, ...]:

@@ -114,8 +114,8 @@ class Variables:
 
     def position_parameters(self) -> list[str]:
         """Return the parameters that determine the poses of the bodies and the twists of the springs at the start."""
-        kinds = ("m", "rad", "1", ""), ("", "ratio", "spring")
-        names = [p.name for p in self.interface.parameters if p.unit in kinds[0] and p.role in kinds[1]]
+        units, roles = ("m", "rad", "1", ""), ("", "ratio", "spring")
+        names = [p.name for p in self.interface.parameters if p.unit in units and p.role in roles]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:

@@ -72,9 +72,9 @@ def scan(
     InputError
         If the interval or the number of samples is not usable.
     """
-    points, values, gaps = _sample_function(function, _samples(low, high, samples))
+    sampled, gaps = _sample_function(function, _samples(low, high, samples))
     roots: list[float] = []
-    for (here, value), (there, following) in pairwise(zip(points, values)):
+    for (here, value), (there, following) in pairwise(sampled):
         # a function value of zero counts as positive: the same root is not found from both sides
         if not (isnan(value) or isnan(following)) and (value < 0.0) != (following < 0.0):
             try:
@@ -89,8 +89,8 @@ def scan(
 
 def _sample_function(
     function: Callable[[float], float], samples: NDArray[np.float64]
-) -> tuple[list[float], list[float], list[tuple[float, str]]]:
-    """Sample a function, also at extrema of the opposite sign between samples; return arguments, values (NaN at gaps), gaps."""
+) -> tuple[list[tuple[float, float]], list[tuple[float, str]]]:
+    """Sample a function, also at extrema of the opposite sign between samples; return (argument, value or NaN), and gaps."""
     values, gaps = np.full(len(samples), np.nan), []
     for i, place in enumerate(samples.tolist()):
         try:
@@ -114,8 +114,7 @@ def _sample_function(
                 continue
             if extremum.fun < 0.0:
                 found.append((float(extremum.x), float(sign * extremum.fun)))
-    found.sort(key=lambda pair: pair[0])
-    return [place for place, _ in found], [value for _, value in found], gaps
+    return sorted(found, key=lambda pair: pair[0]), gaps
 
 
 def find_minimum(

@@ -587,10 +587,8 @@ class Follower:
 
     def _passes(self, first: Point, last: Point, point: Point) -> bool:
         """Return whether the step from ``last`` to ``point`` passes the first point of the curve in the same direction."""
-        chord, way = (
-            self._scale_point(point) - self._scale_point(last),
-            self._scale_point(first) - self._scale_point(last),
-        )
+        begin = self._scale_point(last)
+        chord, way = self._scale_point(point) - begin, self._scale_point(first) - begin
         length = float(np.linalg.norm(chord))
         part = float(way @ chord) / length**2
         distance = float(np.linalg.norm(way - part * chord))

@@ -359,26 +359,26 @@ def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:
     unit = np.array([abs(size), 1.0, abs(size), abs(size)])[: 4 if friction else 3]
     guess = np.array([size, start, height[0] - size, 0.0])[: unit.size] / unit
     try:
-        found = curve_fit(model, n, height / abs(size), guess, method="trf", x_scale="jac", max_nfev=4000)
+        scaled, covariance = curve_fit(model, n, height / abs(size), guess, method="trf", x_scale="jac", max_nfev=4000)
     except RuntimeError as error:
         raise InputError("no decay fits the record's turning points") from error
-    values, errors = found[0] * unit, np.sqrt(np.diag(found[1])) * unit
-    if not values[1] > 0.0 or not np.isfinite(errors).all():
+    values, errors = (scaled * unit).tolist(), (np.sqrt(np.diag(covariance)) * unit).tolist()
+    (size, half, offset, *dry), (_, half_error, _, *dry_error) = values, errors
+    if not half > 0.0 or not np.isfinite(errors).all():
         raise InputError("no decaying motion fits the record's turning points: is there more friction than damping?")
-    side = 1.0 if values[0] > 0.0 else -1.0
     fitted = model(n, *values)
     # the time of a turning point is the less certain, the smaller its distance from the offset
-    (half_period, _), spread = np.polyfit(n, place, 1, w=np.abs(fitted - values[2]), cov=True)
+    (half_period, _), spread = np.polyfit(n, place, 1, w=np.abs(fitted - offset), cov=True)
     return Decay(
         time=place,
         position=height,
         fitted=fitted,
-        decrement=2.0 * float(values[1]),
-        decrement_error=2.0 * float(errors[1]),
+        decrement=2.0 * half,
+        decrement_error=2.0 * half_error,
         frequency=pi / float(half_period),
         frequency_error=pi * sqrt(float(spread[0, 0])) / float(half_period) ** 2,
-        friction=side * float(values[3]) if friction else 0.0,
-        friction_error=float(errors[3]) if friction else 0.0,
-        offset=float(values[2]),
-        residual=float(np.sqrt(np.mean((height - fitted) ** 2)) / abs(values[0])),
+        friction=(dry[0] if size > 0.0 else -dry[0]) if dry else 0.0,
+        friction_error=dry_error[0] if dry else 0.0,
+        offset=offset,
+        residual=float(np.sqrt(np.mean((height - fitted) ** 2)) / abs(size)),
     )

@@ -120,13 +120,13 @@ def convergence(
         name: (system if way.rates else system.without_rates()).wiring(fmi=way.fmi) for name, way in WAYS.items()
     }
     # accelerations jump where a controller takes a sample
-    ports = next(iter(wirings.values()))
+    wiring = next(iter(wirings.values()))
     sources = dict.fromkeys(system.connections.values())
-    names = [str(s) for s in sources if not ports.port(s).unit.endswith("/s2") and str(s) in right.values]
+    names = [str(s) for s in sources if not wiring.port(s).unit.endswith("/s2") and str(s) in right.values]
     errors, powers = ({way: np.full(len(steps), np.nan) for way in WAYS} for _ in range(2))
     messages = {}
-    whole = len(WAYS) * sum(1.0 / step for step in steps)
-    with show_progress(progress, whole, "couplings and steps") as show:
+    work = len(WAYS) * sum(1.0 / step for step in steps)
+    with show_progress(progress, work, "couplings and steps") as show:
         done = 0.0
         for way in WAYS:
             for number, step in enumerate(steps):

@@ -76,16 +76,14 @@ def _parts(value: Any, name: str) -> dict[str, PartTable]:
 
 
 def _connections(value: Any, name: str) -> dict[End, End]:
-    ends = {}
-    for target, source in _flat_table(value, name).items():
-        pair = []
-        for text in (target, files.text(source, f"{name}.{target}")):
-            part, dot, port = text.partition(".")
-            if not (part and dot and port):
-                raise ParameterError(f"{name}.{target}", text, "be a part and its variable, as in motor.rotor.speed")
-            pair.append(End(part, port))
-        ends[pair[0]] = pair[1]
-    return ends
+    def read_end(text: str, target: str) -> End:
+        part, _, port = text.partition(".")
+        if not (part and port):
+            raise ParameterError(f"{name}.{target}", text, "be a part and its variable, as in motor.rotor.speed")
+        return End(part, port)
+
+    ends = _flat_table(value, name).items()
+    return {read_end(t, t): read_end(files.text(source, f"{name}.{t}"), t) for t, source in ends}
 
 
 @dataclass(frozen=True, kw_only=True)

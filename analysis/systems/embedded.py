@@ -130,20 +130,17 @@ def _header(wiring: Wiring) -> str:
         advance.append(f"STEP({kind}, {c}, time, step)")
         finish.append(f"END({kind}, {c})")
     for end, place in at.items():
-        read.append(
-            f"GET({native[end.part]}, {names[end.part]}, {wiring.port(end).reference}, {place})"
-            if end.part in native
-            else f"{place} = {names[end.part]}.{_field(end.port)};"
-        )
+        c = names[end.part]
+        if end.part in native:
+            read.append(f"GET({native[end.part]}, {c}, {wiring.port(end).reference}, {place})")
+        else:
+            read.append(f"{place} = {c}.{_field(end.port)};")
     for target, source in wiring.connections.items():
-        put.append(
-            (
-                f"SET({native[target.part]}, Real, {names[target.part]}, {wiring.port(target).reference}, {at[source]})"
-                if target.part in native
-                else f"{names[target.part]}.{_field(target.port)} = {at[source]};"
-            )
-            + f" /* {source} -> {target} */"
-        )
+        c, note = names[target.part], f" /* {source} -> {target} */"
+        if target.part in native:
+            put.append(f"SET({native[target.part]}, Real, {c}, {wiring.port(target).reference}, {at[source]}){note}")
+        else:
+            put.append(f"{c}.{_field(target.port)} = {at[source]};{note}")
     said = ", ".join(json.dumps(str(end)) for end in ends)
     return "\n".join(
         [

@@ -49,11 +49,10 @@ class _Model:
         self.rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
         self.constants = [float(values.get(channel.name, 0.0)) for channel in mechanism.channels]
 
-    def commanding_inputs(self) -> dict[int, str]:
-        """Return the freedoms whose rates are commanded, each with the name of the commanding input."""
+    def commanding_inputs(self) -> dict[int, int]:
+        """Return the freedoms whose rates are commanded, each with the index of the commanding channel."""
         chosen = {mode.name: int(value) for mode, value in zip(self.mechanism.modes, self.modes)}
-        commands = (self.mechanism.channels[number] for number in self.mechanism.commands(chosen))
-        return {channel.freedom: channel.name for channel in commands}
+        return {self.mechanism.channels[number].freedom: number for number in self.mechanism.commands(chosen)}
 
 
 class JoinedSystem:
@@ -98,14 +97,13 @@ class JoinedSystem:
         for name, model in self.models.items():
             m, s = model.mechanism, model.traced.symbols
             x, n = casadi.SX.sym(name, m.size), len(m.freedoms)
-            sources = {c.name: system.connections.get(End(name, c.name)) for c in m.channels}
-            u = [wire(sources[c.name], value) for c, value in zip(m.channels, model.constants)]
+            sources = [system.connections.get(End(name, channel.name)) for channel in m.channels]
+            u = [wire(source, value) for source, value in zip(sources, model.constants)]
             inside = casadi.vertsplit(x)
             for freedom, command in model.commanding_inputs().items():
-                number = next(k for k, c in enumerate(m.channels) if c.name == command)
-                rate = next(k for k, c in enumerate(m.channels) if c.freedom == freedom and c.kind == "rate")
-                inside[n + freedom], source = u[number], sources[command]
-                if source is not None and source.part in self.models:
+                inside[n + freedom], source = u[command], sources[command]
+                rate = m.channel_index(freedom, "rate")
+                if rate is not None and source is not None and source.part in self.models:
                     u[rate] = wire(End(source.part, self.models[source.part].rate_of[source.port]))
             own = casadi.vertcat(*inside)
             put = [casadi.vertcat(*u) if u else casadi.SX(0, 1), casadi.DM(model.modes), own]

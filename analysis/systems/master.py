@@ -130,12 +130,12 @@ class _Instances:
                 self.instances[name] = make_instance(part)
             self.ends = [End(name, output) for name, each in self.instances.items() for output in each.outputs]
             index = {end: number for number, end in enumerate(self.ends)}
-            self.targets = t = {target: number for number, target in enumerate(wiring.connections)}
+            self.targets = targets = {target: number for number, target in enumerate(wiring.connections)}
             #: For each connected input the number of its output; for each part the names and numbers of its connected inputs.
             self.sources = np.array([index[source] for source in wiring.connections.values()], dtype=int)
             self.own = {
-                name: ([t.port for t in self.targets if t.part == name],
-                       np.array([n for t, n in self.targets.items() if t.part == name], dtype=int))
+                name: ([target.port for target in self.targets if target.part == name],
+                       np.array([n for target, n in self.targets.items() if target.part == name], dtype=int))
                 for name in self.instances
             }  # fmt: skip
             #: Parts whose outputs change only at discrete instants.
@@ -173,10 +173,10 @@ class _Instances:
         )
         #: For each connected input the connected input that is its rate over a step, or itself if there is none.
         self.partner = np.array(
-            [self.targets.get(wiring.rate_input(t) or t, number) for t, number in self.targets.items()], dtype=int
+            [self.targets.get(wiring.rate_input(end) or end, n) for end, n in self.targets.items()], dtype=int
         )
         #: For each power bond the numbers of the outputs effort and flow, and of the inputs to which they are connected.
-        numbers = [(index[b.effort], index[b.flow], t[b.effort_to], t[b.flow_to]) for b in bonds]
+        numbers = [(index[b.effort], index[b.flow], targets[b.effort_to], targets[b.flow_to]) for b in bonds]
         self.bonds = np.array(numbers, dtype=int).reshape(-1, 4).T
         self.outputs = self.before = self._read()
         self.last = 1.0

@@ -219,7 +219,7 @@ def _reach(links: Sequence[tuple[End, End]], start: End, systems: Container[str]
     """Return the ends at parts that are connected to the end ``start``, directly or through edges of systems."""
     seen, found = [start], []
     for end in seen:
-        for other in (pair[not n] for pair in links for n in (0, 1) if pair[n] == end):
+        for other in (there for pair in links for here, there in (pair, pair[::-1]) if here == end):
             if other.part in systems and other not in seen:
                 seen.append(other)
             elif other.part not in systems and other != start:
@@ -255,10 +255,8 @@ def _check_supported(path: str | Path, system: Node) -> None:
 def _check_connectors(component: Node, part: Part, units: Mapping[str, Base]) -> None:
     """Refuse a connector with another unit than its variable: connected values would be taken in the wrong unit."""
     for connector in _below(component, "Connectors", "Connector"):
-        port, unit = (
-            part.ports.get(connector.get("name", "")),
-            next((c.get("unit", "") for c in connector if "unit" in c.attrib), ""),
-        )
+        port = part.ports.get(connector.get("name", ""))
+        unit = next((child.get("unit", "") for child in connector if "unit" in child.attrib), "")
         if port is None or unit in ("", port.unit):
             continue
         base = part.base_unit(port.name)
@@ -331,7 +329,8 @@ def _convert(value: float, part: Part, key: str, unit: str, base: Base | None) -
         return value
     if base is None or len(own) != len(base) or own[:-2] != base[:-2]:
         raise WiringError(f"{part.name}.{key} starts with {value:g} {unit}: it must be in {port.unit or 'no unit'}")
-    return float((value * base[-2] + base[-1] - own[-1]) / own[-2])
+    (factor, offset), (own_factor, own_offset) = base[-2:], own[-2:]
+    return float((value * factor + offset - own_offset) / own_factor)
 
 
 def _as_number(text: str, port: Port | None, name: str) -> float:

@@ -216,13 +216,11 @@ class Wiring:
                     raise WiringError(
                         f"{source} -> {target}: {end} is of type {port.type}: only real variables are connected"
                     )
-            units = [self.port(end).unit for end in (source, target)]
-            bases = [self.parts[end.part].base_unit(end.port) for end in (source, target)]
-            if units[0] != units[1] and bases[0] and bases[1] and not same_unit(bases[0], bases[1]):
-                said = [unit or "without a unit" for unit in units]
-                raise WiringError(
-                    f"{source} -> {target}: the units do not match, {said[0]} and {said[1]}; they must be the same"
-                )
+            unit, other = (self.port(end).unit for end in (source, target))
+            base, other_base = (self.parts[end.part].base_unit(end.port) for end in (source, target))
+            if unit != other and base and other_base and not same_unit(base, other_base):
+                said = " and ".join(name or "without a unit" for name in (unit, other))
+                raise WiringError(f"{source} -> {target}: the units do not match, {said}; they must be the same")
 
     def port(self, end: End) -> Port:
         """Return the port at an end of a connection."""

@@ -517,12 +517,12 @@ class _Survey:
         """
         other, up = self.axes[1 - which], self.axes[which]
         spans = (self.box.x, self.box.y)
+        (left, right), (least, greatest) = spans[1 - which], spans[which]
         across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
         low, high, top = float(across.min()), float(across.max()), float(dampings.max())
-        greatest, size = spans[which][1], spans[which][1] - spans[which][0]
         whose = "" if boundary.motion == TRUE_ORBIT else f" of {boundary.motion}"
         region = f"{boundary.kind.value}{whose} from {other.format_value(low)} to {other.format_value(high)}"
-        if top > greatest - 1e-6 * size:
+        if top > greatest - 1e-6 * (greatest - least):
             return f"{region}: still there at {up.format_value(greatest)}"
         by_points = (
             f"{region}: gone from about {self.damping} = {top:.4g} {up.si} on, the greatest on its traced boundary"
@@ -531,7 +531,7 @@ class _Survey:
             return by_points
         # a range of the other parameter that contains this region and no other
         margin = 0.25 * (high - low)
-        x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
+        x = max(left, low - margin), min(right, high + margin)
         test = plane_test(matrix, boundary.kind)
         try:
             found = removing_damping(

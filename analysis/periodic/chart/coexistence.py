@@ -17,7 +17,7 @@ from linkwork.errors import InputError
 
 from ...display import NotebookResult, format_count, format_turns
 from ...files import Whole, unknown_name, write_csv
-from ...mechanisms import Parameters, find_mechanism
+from ...mechanisms import Parameters
 from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
@@ -47,6 +47,8 @@ _GROWTH = 1.001
 #: Default plane of basins: its width relative to the range of the motions, and the range relative to the scale below which a
 #: coordinate counts as at rest.
 _WIDTH, _REST = 1.5, 1e-9
+#: Columns of the arrays with the motions of a point: largest multiplier, amplitude, index, first component of the start.
+_LARGEST, _AMPLITUDE, _INDEX, _START = range(4)
 # Functions of the flow for a search and for a basin, in addition to GAP
 _SEARCHED = PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
 _FOLLOWED = IN_LANES + PLAIN, IN_LANES + GAP
@@ -176,7 +178,7 @@ def coexistence(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
-        (len(xs), MOST_ORBITS, guesses.shape[1] + 3),
+        (len(xs), MOST_ORBITS, _START + guesses.shape[1]),
         kernels.solve_all,
         folder=folder,
         n_jobs=n_jobs,
@@ -189,9 +191,9 @@ def coexistence(
     return Coexistence(
         x=xs,
         y=ys,
-        largest=np.ma.masked_invalid(data[..., 0]),
-        amplitude=np.ma.masked_invalid(data[..., 1]),
-        starts=data[..., 3:],
+        largest=np.ma.masked_invalid(data[..., _LARGEST]),
+        amplitude=np.ma.masked_invalid(data[..., _AMPLITUDE]),
+        starts=data[..., _START:],
         index=_indices(data),
         index_of_all=whole,
         swing=rows[0].flow.components[0],
@@ -227,12 +229,12 @@ def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArra
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan
     whole = np.concatenate([largest[..., None], amplitude[..., None], signs[..., None], starts], axis=2)
-    return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, n + 3)
+    return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, _START + n)
 
 
 def _indices(data: FloatArray) -> NDArray[np.int64]:
     """Return the sum of the indices of the motions at each point; ``data`` is the result of `_compute_motions`."""
-    return np.nansum(data[..., 2], axis=2).astype(np.int64)
+    return np.nansum(data[..., _INDEX], axis=2).astype(np.int64)
 
 
 def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data: FloatArray, whole: int) -> None:
@@ -244,14 +246,14 @@ def _seek_from_neighbours(operation: Plane, xs: FloatArray, ys: FloatArray, data
     fresh = np.ones(data.shape[:2], dtype=bool)
     while fresh.any():
         tried, fresh = fresh, np.zeros_like(fresh)
-        sums, counts = _indices(data), np.isfinite(data[..., 0]).sum(axis=2)
+        sums, counts = _indices(data), np.isfinite(data[..., _LARGEST]).sum(axis=2)
         for j, i in zip(*np.nonzero(sums != whole)):
             point = operating_point(*operation(float(xs[i]), float(ys[j])))
             for row, column in product((j - 1, j, j + 1), (i - 1, i, i + 1)):
                 if not (0 <= row < len(ys) and 0 <= column < len(xs) and tried[row, column]):
                     continue
                 if counts[row, column] and (counts[row, column] > counts[j, i] or sums[row, column] == whole):
-                    starts = data[row, column, : counts[row, column], 3:]
+                    starts = data[row, column, : counts[row, column], _START:]
                     fresh[j, i] |= _add_motions(point, starts, data[j, i], whole)
 
 
@@ -261,20 +263,20 @@ def _add_motions(point: OperatingPoint, starts: FloatArray, into: FloatArray, wh
     For each motion of the point, the nearest of ``starts`` is skipped: it is probably the same motion. Return whether a motion
     was added. ``into`` is the point's part of the result of `_compute_motions`.
     """
-    count = before = int(np.isfinite(into[:, 0]).sum())
-    away = np.abs(point.flow.remove_turns(into[:count, None, 3:] - starts) / point.scale(starts[0])).max(axis=2)
+    count = before = int(np.isfinite(into[:, _LARGEST]).sum())
+    away = np.abs(point.flow.remove_turns(into[:count, None, _START:] - starts) / point.scale(starts[0])).max(axis=2)
     for start in np.delete(starts, away.argmin(axis=1), axis=0):
-        if count == MOST_ORBITS or int(np.nansum(into[:, 2])) == whole:
+        if count == MOST_ORBITS or int(np.nansum(into[:, _INDEX])) == whole:
             break
         try:
             orbit = solve_orbit(point, 1, start)
         except OrbitError:
             continue
-        if all(orbit.distance(known) > SAME for known in into[:count, 3:]):
+        if all(orbit.distance(known) > SAME for known in into[:count, _START:]):
             head = orbit.largest, orbit.amplitude, index(orbit.monodromy)
             into[count] = *head, *point.flow.nearest_to_rest(orbit.start)
             count += 1
-    into[:count] = into[np.argsort(into[:count, 1], kind="stable")]
+    into[:count] = into[np.argsort(into[:count, _AMPLITUDE], kind="stable")]
     return count > before
 
 
@@ -410,7 +412,8 @@ def basins(
     (2, True)
     """
     require_turns(turns)
-    points, flow = Whole(least=1)(points, "points"), operating_point(parameters, drive).flow
+    points, point = Whole(least=1)(points, "points"), operating_point(parameters, drive)
+    flow = point.flow
     half, place = flow.size // 2, find_coordinate(flow, coordinate)
     if position is not None:
         position = pair(position, flow.components[place][1], "position")
@@ -420,9 +423,9 @@ def basins(
         found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        of, also = describe_turns(drive.flow(find_mechanism(parameters)), turns), unsought_hint(parameters, drive)
         raise InputError(
-            f"no stable motion of {of} was found here, so that there are no basins{also}"
+            f"no stable motion of {describe_turns(flow, turns)} was found here, so that there are no basins"
+            + unsought_hint(parameters, drive)
             + (found.reason and f": {found.reason}")
         )
     if coordinate is None and position is None and rate is None:
@@ -436,8 +439,7 @@ def basins(
     # a start may settle on a motion of several turns at the beginning of any of its turns
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
-    point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
-    row, measures = point_row([point], known[0]), _measures(point, found)
+    row, measures, code = point_row([point], known[0]), _measures(point, found), row_code(kernels.settle_starts)
     ends, computed = compute_rows(
         partial(_ends, point, known, measures, place, across),
         up.tolist(),

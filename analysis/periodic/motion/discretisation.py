@@ -231,20 +231,20 @@ def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> Ope
     return operating_point(parameters, drive)
 
 
-def can_collocate(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
+def can_collocate(drives: Iterable[Drive], sets: Iterable[Parameters]) -> bool:
     """Return whether collocation can be used: all speeds must be prescribed, and all rates must be smooth functions.
 
     Collocation assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed. This does
     not hold for a second crank that turns freely, or for a link that goes round.
     """
-    mechanisms = list(dict.fromkeys(mechanisms))
+    sets = list(dict.fromkeys(sets))
+    mechanism = find_mechanism(sets[0])
 
-    def follows(drive: Drive) -> bool:
-        mechanism = find_mechanism(mechanisms[0])
+    def goes_round(drive: Drive) -> bool:
         ratios = drive.ratios_by_freedom(mechanism)
-        return drive.speed_drive and not (ratios and {*drive.flow(mechanism).free} & {*ratios})
+        return bool(ratios and {*drive.flow(mechanism).free} & {*ratios})
 
-    return all(map(follows, drives)) and all(map(is_smooth, mechanisms))
+    return all(drive.speed_drive and not goes_round(drive) for drive in drives) and all(map(is_smooth, sets))
 
 
 class Stations(NamedTuple):

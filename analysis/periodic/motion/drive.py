@@ -22,7 +22,7 @@ from ... import run
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ...numerics.cache import code_folder, load_or_make
-from ...run import InductionMotor, Inputs, complete_inputs, speed_ratio, takes_published
+from ...run import InductionMotor, Inputs, takes_published
 from ...units import Amount, in_si
 from .flow import PLAIN, Crank, Flow, find_crank, find_turning_freedom, flow
 
@@ -131,7 +131,7 @@ class Drive:
             if first is None or len(known) < len(speeds):
                 mirror = _MIRROR if known and first is None and min(known.values()) < 0.0 else ""
                 raise InputError(f"speeds are {dict(speeds)} rad/s: they must be finite, and one above zero{mirror}")
-            ratios = {name: speed_ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
+            ratios = {n: run.speed_ratio(n, speed, first, speeds[first]) for n, speed in speeds.items() if n != first}
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
         if self.ratios:
@@ -227,8 +227,8 @@ class Drive:
         base = lcm(common, *(of.denominator for of in whole.values()))
         made = flow(mechanism, modes, crank.freedom, base, base // common)
         for number in made.others:
-            name = mechanism.freedoms[number].coordinate
-            if number in made.free and number not in ratios and not mechanism.freedoms[number].swings:
+            name = freedoms[number].coordinate
+            if number in made.free and number not in ratios and not freedoms[number].swings:
                 raise InputError(
                     f"{name} is free: say how often it turns for each turn of the crank, in Python ratios = {{{name!r}: 1}}, "
                     f"in a case by the speeds at the start, such as initial.{freedoms[number].initial[1]}"
@@ -294,6 +294,7 @@ class Drive:
             motor = self.motor if channel == crank.torque else self.motors.get(name)
             if motor is not None:
                 require_acting(self, mechanism, mechanism.channels[channel])
+            # a motor without a breakdown torque exerts no torque
             motors += [0.0, 1.0, 1.0] if motor is None else [getattr(motor, field) for field in run.MOTOR]
         if wrong := [name for name in self.motors if numbers.get(name) not in mechanism.torques]:
             raise unknown_name(wrong[0], [mechanism.channels[n].name for n in mechanism.torques])
@@ -331,7 +332,7 @@ def _read_ratio(name: str, value: object) -> Fraction:
             f"the ratio of {name} is {value!r}: it must be a finite number of turns per turn of the crank, such as -0.5 or "
             "Fraction(-1, 2)"
         )
-    return speed_ratio(name, float(value), "crank", 1.0)
+    return run.speed_ratio(name, float(value), "crank", 1.0)
 
 
 def _whole_turns(freedom: Freedom) -> int:
@@ -445,10 +446,10 @@ def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
 
     In the drive of the set, held degrees of freedom are at the set's initial values.
     """
-    return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
+    return drive or steady_drive(known.parameters, run.complete_inputs(known, None), known.initial)
 
 
-@takes_published(inputs=complete_inputs, initial=run.complete_initial_state)
+@takes_published(inputs=run.complete_inputs, initial=run.complete_initial_state)
 @in_si(speed="rad/s", torque="N.m")
 def steady_drive(
     parameters: Parameters,
@@ -496,7 +497,7 @@ def steady_drive(
                 constant[channel.name] = constant.get(channel.name, 0.0) + float(part)
             else:
                 raise VaryingInputError(channel.argument, part)
-    named = [None if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque)]
+    speed_name, torque_name = ("" if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque))
     for channel in mechanism.channels:
         turns = channel.freedom in mechanism.cyclic_freedoms
         if channel.kind == "command" and not turns and constant.get(channel.name, 0.0) != 0.0:
@@ -512,13 +513,13 @@ def steady_drive(
     angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))
     coordinate = {n: f.coordinate for n, f in enumerate(mechanism.freedoms)}
     several = len(mechanism.cyclic_freedoms) > 1
-    torques = [constant[name] for name in named[1:] if name in constant]
+    torques = [constant[torque_name]] if torque_name in constant else []
     torques += [float(part) for part in parts if not isinstance(part, InductionMotor)]
     return Drive(
-        speed=constant.get(named[0] or "") if speed is None else speed,
+        speed=constant.get(speed_name) if speed is None else speed,
         torque=sum(torques) if torques else None,
         motor=motors[0] if motors else None,
-        forces={name: constant[name] for name in force_inputs(mechanism) if name in constant and name != named[1]},
+        forces={name: constant[name] for name in force_inputs(mechanism) if name in constant and name != torque_name},
         held={f.coordinate: float(getattr(initial, f.initial[0])) - ratios.get(n, 0) * angle for n, f in other.items()},
         modes={f.mode.name: modes[f.mode.name] for f in other.values() if f.mode is not None},
         crank=coordinate[crank.freedom] if several else "",
@@ -550,7 +551,7 @@ def _choose_crank(
         if n == first:
             continue
         if n in speeds and first in speeds:
-            ratios[n] = speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
+            ratios[n] = run.speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
         elif n in speeds:
             ratios[n] = Fraction(0)
         elif speed != 0.0 and (start[n] != 0.0 or not freedoms[n].coupled):
@@ -658,15 +659,17 @@ def start_ranges(
 
     low, high = assembly_ranges(parameters, drive, guess)
     coupled = {n for n, ratio in drive.ratios_by_freedom(mechanism).items() if ratio}
+
+    def is_too_fast(place: int, away: float, most: float) -> bool:
+        vibrations = square(place, away)
+        return vibrations > most or (flow.free[place] in coupled and vibrations * away**2 > _FASTEST**2)
+
     for bound in (low, high):
         for i, away in enumerate((bound - flow.rest[:half]).tolist()):
             most = max(_FASTEST**2, 4.0 * square(i, 1e-6 * away))
             # a bound may lie a step beyond the limit of assembly, where there are no accelerations
             inside = away if isfinite(square(i, away)) else away / _WIDER
-            while abs(inside) > 1e-3 * abs(away) and (
-                (vibrations := square(i, inside)) > most
-                or (flow.free[i] in coupled and vibrations * inside**2 > _FASTEST**2)
-            ):
+            while abs(inside) > 1e-3 * abs(away) and is_too_fast(i, inside, most):
                 inside /= _WIDER
                 bound[i] = flow.rest[i] + inside
     return low, high

@@ -735,13 +735,14 @@ class OrbitEquations:
     def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:
         self.family, self.turns, self.low, self.high = family, turns, low, high
         self._bounds = [family.operation(value) for value in (low, high)]
-        (mechanism, drive), (other, last) = self._bounds
-        flow = drive.flow(find_mechanism(mechanism))
+        (first, drive), (last, last_drive) = self._bounds
+        flow = drive.flow(find_mechanism(first))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
         self._shape = len(self.angles) - 1, flow.size
-        self._discretised = Discretisation(self.angles, discretisation.can_collocate((drive, last), (mechanism, other)))
+        collocated = discretisation.can_collocate((drive, last_drive), (first, last))
+        self._discretised = Discretisation(self.angles, collocated)
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
-        self._direction = family.direction(high, low, high) if mechanism is other else None
+        self._direction = family.direction(high, low, high) if first is last else None
 
     def scale(self, start: FloatArray) -> FloatArray:
         """Return the scale of each unknown, its typical magnitude: the larger of the scales at the two ends of the range."""

@@ -488,11 +488,11 @@ def search_orbits(
         for sign in (1, -1)
     ]
     parts: dict[Any, Orbits] = {}
-    for own, of in drives:
-        kind = tuple(sorted(own.ratios.items()))
+    for each, own_turns in drives:
+        kind = tuple(sorted(each.ratios.items()))
         if kind not in parts:
-            alike = [orbit for orbit in known if orbit.drive.ratios == own.ratios]
-            parts[kind] = _search_rounds(operating_point(parameters, own), of, start, alike)
+            alike = [orbit for orbit in known if orbit.drive.ratios == each.ratios]
+            parts[kind] = _search_rounds(operating_point(parameters, each), own_turns, start, alike)
     return join_orbits(list(parts.values()))
 
 
@@ -651,8 +651,10 @@ def _reached_motion(
         return stable[0]
     point = operating_point(stable[0].parameters, drive)
     guess = first_guess(point.flow, drive, near)
-    arrived, pace = None, None if drive.speed is None and start is not None else _speed_of_drive(drive)
-    if pace is not None and pace > 0.0 and turns == 1:
+    arrived, pace = None, _speed_of_drive(drive)
+    # under a motor a given start is followed itself, without a run-up
+    runs_up = drive.speed is not None or start is None
+    if runs_up and pace is not None and pace > 0.0 and turns == 1:
         last = sweep(point.parameters, np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS), drive=drive).orbits[-1]
         if last is not None and last.periods == 1:
             arrived = last

@@ -338,10 +338,9 @@ class Family:
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = find_mechanism(self.parameters)
-        vectors, numbers = zip(
-            *((d.vector(mechanism), np.array(p.constants())) for p, d in (self.operation(a), self.operation(b)))
-        )
-        return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
+        (first, drive), (last, last_drive) = self.operation(a), self.operation(b)
+        change = np.array(last.constants()) - np.array(first.constants())
+        return Direction((last_drive.vector(mechanism) - drive.vector(mechanism)) / (b - a), change / (b - a))
 
 
 FloatArray = NDArray[np.float64]

@@ -139,17 +139,17 @@ class Branch(NotebookResult):
     @cached_property
     def _columns(self) -> dict[str, NDArray[np.float64]]:
         turns = [orbit.turn() for orbit in self.orbits]
-        values = _turn_columns(self.orbits[0], turns[0])
+        functions = _turn_columns(self.orbits[0], turns[0])
         unit = f" [{self.family.unit}]" if self.family.unit else ""
         largest = self.largest_multiplier
         signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
-        first = {
+        columns = {
             f"{self.family.name}{unit}": self.parameter,
             "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
             "largest multiplier [1]": largest,
             "stable (1), marginal (0), unstable (-1)": signs,
         }
-        return first | {name: np.array([value(turn) for turn in turns]) for name, value in values.items()}
+        return columns | {name: np.array([value(turn) for turn in turns]) for name, value in functions.items()}
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the branch as a CSV table with one row per point; the columns are those of `columns`."""
@@ -498,18 +498,16 @@ def _repeats_early(orbit: PeriodicOrbit) -> bool:
         return False
 
 
+def _test_values(points: Sequence[Point], kind: Crossing) -> NDArray[np.float64]:
+    """Return a test function at points: the parameter's change along the branch for a fold, `crossing_test` for others."""
+    if kind is Crossing.FOLD:
+        return np.array([point.tangent[-1] for point in points])
+    return crossing_test(np.array([point.data.monodromy for point in points]), kind)
+
+
 def _test_value(point: Point, kind: Crossing, sign: float = 1.0) -> float:
-    """Return ``sign`` times a test function: the parameter's change along the branch for a fold, `crossing_test` for others."""
-    return sign * float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
-
-
-def _test_values(points: Sequence[Point]) -> dict[Crossing, NDArray[np.float64]]:
-    """Return the values of all test functions at the points of a branch: see `_test_value`."""
-    matrices = np.array([point.data.monodromy for point in points])
-    return {
-        kind: np.array([p.tangent[-1] for p in points]) if kind is Crossing.FOLD else crossing_test(matrices, kind)
-        for kind in Crossing
-    }
+    """Return ``sign`` times a test function at one point: see `_test_values`."""
+    return sign * float(_test_values([point], kind)[0])
 
 
 def _insert_dips(curve: Curve, follower: Follower) -> Curve:
@@ -524,7 +522,8 @@ def _insert_dips(curve: Curve, follower: Follower) -> Curve:
     if len(steps) < 3:
         return curve
     inside, found = np.array(steps[1:-1]), dict[int, tuple[Point, float]]()
-    for kind, tested in _test_values(points).items():
+    for kind in Crossing:
+        tested = _test_values(points, kind)
         sign = np.sign(tested[1:-2])
         first, here, there, last = (sign * tested[k : len(inside) + k] for k in range(4))
         fall, rise = (here - first) / steps[:-2], (last - there) / steps[2:]
@@ -578,7 +577,7 @@ def _special_points(
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     problems: list[str] = []
-    values = _test_values(curve.points)
+    values = {kind: _test_values(curve.points, kind) for kind in Crossing}
     for i, (before, after, length) in enumerate(zip(curve.points, curve.points[1:], curve.steps)):
         changed = {kind for kind, tested in values.items() if tested[i] * tested[i + 1] < 0.0}
         for kind, tested in _crossings(before, after, changed):

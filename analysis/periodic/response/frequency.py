@@ -420,7 +420,8 @@ class _Search:
             )
 
         doubled, without = self.branches, list[str]()
-        for largest in (GREATEST_MULTIPLIER, *[GREATEST_OF_SEVERAL] * (times - 1))[:times]:
+        for generation in range(times):
+            largest = GREATEST_OF_SEVERAL if generation else GREATEST_MULTIPLIER
             points = [(b.family, s) for b in doubled for s in b.special if s.kind is motion.Crossing.PERIOD_DOUBLING]
             doubled = []
             for family, special in points:
@@ -498,8 +499,8 @@ class _Search:
         if not drive.speed_drive:
             # under a torque only a known motion gives a guess of the speed
             simple = [b for b in self.branches if b.periods == 1]
-            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
-            start = min(points, key=lambda point: float(point[0]))[1].start
+            nearest = min(simple, key=lambda b: float(np.abs(b.parameter - value).min()))
+            start = nearest.orbits[int(np.abs(nearest.parameter - value).argmin())].start
         limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
         for orbit in motion.search_orbits(parameters, drive, turns=turns, start=start).orbits:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):

@@ -171,13 +171,11 @@ class MotionGradient:
         return self._gradient(way / self.period.value, -way / self.period.value**2 * self.period.by)
 
     @cached_property
-    def _swing(self) -> tuple[tuple[float, float, Place], ...]:
+    def _extremes(self) -> tuple[tuple[float, float, Place], tuple[float, float, Place]]:
         """The greatest and the least value of the coordinate, each as (sign, which is +1 or -1; value; place)."""
-        found = []
-        for sign in (1.0, -1.0):
-            value, place = self.variations.greatest_value(sign * self.variations.y[..., self.coordinate])
-            found.append((sign, sign * value, place))
-        return tuple(found)
+        y = self.variations.y[..., self.coordinate]
+        (greatest, top), (opposite, bottom) = (self.variations.greatest_value(sign * y) for sign in (1.0, -1.0))
+        return (1.0, greatest, top), (-1.0, -opposite, bottom)
 
     @cached_property
     def amplitude(self) -> Gradient:
@@ -188,10 +186,11 @@ class MotionGradient:
         """Return the gradient of the amplitude for given derivatives of the motion, shape (k, s, n, m)."""
         # to first order the value of an extremum does not depend on its place
         own = solution[:, :, self.coordinate, :]
-        by = [0.5 * sign * place.weights @ own[place.panel] for sign, _, place in self._swing]
+        by = sum(0.5 * sign * place.weights @ own[place.panel] for sign, _, place in self._extremes)
         # an amplitude that is a rounding error is zero: see `Turn.swing_amplitude`
         still = self.orbit.amplitudes[self.coordinate] == 0.0
-        return self._gradient(0.0 if still else 0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
+        (_, greatest, _), (_, least, _) = self._extremes
+        return self._gradient(0.0 if still else 0.5 * (greatest - least), np.asarray(by))
 
     def amplitude_curvature(self, along: str) -> Gradient:
         """Return the gradient of the derivative of the amplitude with respect to the parameter ``along``."""
@@ -203,7 +202,7 @@ class MotionGradient:
         forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ bent
         second, rates = v.periodic_solution(forcing)[0], v.by_y @ solution + v.forcing
         total = np.zeros(len(self.names))
-        for sign, _, place in self._swing:
+        for sign, _, place in self._extremes:
             # the place of the extremum moves so that the rate there stays zero
             curvature = v.slope(place.panel, v.rates[place.panel, :, own], place.position)
             rate = place.weights @ rates[place.panel, :, own, :]

@@ -177,20 +177,16 @@ class Variations:
         relative = self.scale[:, None] / self.scale
         jumps = _greatest((np.roll(self.by_y[:, 0], -1, axis=0) - self.by_y[:, 0]) / relative)
         steep = jumps > _STEEP * np.sqrt(self.h) * np.abs(self.by_y / relative).max()
+        slope = _angle_derivatives(self.flow, self.switched)
+        modes = list(self.flow.modes)
+
+        def derivatives(panel: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+            by_angle = slope(self.angles[panel, 0], self.y[panel, 0], modes, self._drive, self._p)
+            return self.by_y[panel, 0], self.by_constant[panel, 0], np.asarray(by_angle).ravel()
+
         kinks = []
         for k in np.flatnonzero(steep & self._joined & (self.h < _KINK)).tolist():
-            slope = _angle_derivatives(self.flow, self.switched)
-            before, after = (
-                (
-                    self.by_y[e, 0],
-                    self.by_constant[e, 0],
-                    np.asarray(
-                        slope(self.angles[e, 0], self.y[e, 0], list(self.flow.modes), self._drive, self._p)
-                    ).ravel(),
-                )
-                for e in (k, (k + 1) % len(self.h))
-            )
-            by_y, by_constant, by_angle = map(np.subtract, after, before)
+            by_y, by_constant, by_angle = map(np.subtract, derivatives((k + 1) % len(self.h)), derivatives(k))
             kinks.append(_Kink(k, by_y, by_constant, by_y @ self.rates[k, 0] + by_angle))
         return kinks
 
@@ -482,9 +478,8 @@ def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
 @cache
 def _angle_derivatives(flow: Flow, switched: bool) -> Any:
     """Return the function that gives the derivatives of the rates by the angle."""
-    casadi = symbolic.library()
     s = _symbols(flow, switched)
-    return _make_function(s, casadi.jacobian(s.rates, s.angle))
+    return _make_function(s, symbolic.library().jacobian(s.rates, s.angle))
 
 
 @cache
