@@ -202,7 +202,10 @@ def _rotation_bias(w: float, c: float, s: float, a: Vector, x: float, y: float) 
 
 
 def _shares(c: float, s: float, a: Vector) -> tuple[tuple[float, float], ...]:
-    """Return the columns of the arm ``a`` in outer axes, without the bias; the body's direction has cosine c and sine s."""
+    """Return the columns (see `Vector`) of an arm without its bias in outer axes, from the arm ``a`` in the body's axes.
+
+    The direction of the body has the cosine c and the sine s.
+    """
     return tuple((c * g[0] - s * g[1], s * g[0] + c * g[1]) for g in a.columns[:-1])
 
 
@@ -513,6 +516,11 @@ def wrench_moment(f: Wrench, at: Vector) -> float:
     return f.moment - at.x * f.y + at.y * f.x
 
 
+def _wrench_from_moment(at: Vector, x: float, y: float, moment: float) -> Wrench:
+    """Return the wrench of a force (x, y) whose moment about the point ``at`` is ``moment``."""
+    return Wrench(x, y, moment + at.x * y - at.y * x)
+
+
 def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) -> Wrench:
     """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; body 1 is pinned at p, body 2 at q.
 
@@ -527,7 +535,7 @@ def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) 
 def pin_to_block(p: Vector, c: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
     """Return the force of the block on body 1 of a dyad RRP in the pin at c.
 
-    Body 1 is pinned at p; the block slides along t.
+    Body 1 is pinned at p; the block slides along t. For ``on1`` and ``on2`` see `pin_between_pins`.
     """
     ux, uy = c.x - p.x, c.y - p.y
     # u x F = m1; -F . t = along
@@ -548,8 +556,7 @@ def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) 
     m1, m2 = wrench_moment(on1, p), wrench_moment(on2, q)
     # the force normal to the slide: its moments about p and q differ by (q - p) . t times the force
     across = (m1 + m2) / ((q.x - p.x) * t.c + (q.y - p.y) * t.s)
-    x, y = -across * t.s, across * t.c
-    return Wrench(x, y, m1 + p.x * y - p.y * x)
+    return _wrench_from_moment(p, -across * t.s, across * t.c, m1)
 
 
 def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
@@ -559,8 +566,7 @@ def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wre
     """
     m1, f2 = wrench_moment(on1, p), on2.x * t.c + on2.y * t.s
     across = -f2 / (t.s * r.c - t.c * r.s)
-    x, y = -across * r.s, across * r.c
-    return Wrench(x, y, m1 + p.x * y - p.y * x)
+    return _wrench_from_moment(p, -across * r.s, across * r.c, m1)
 
 
 def force_from_mate(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
@@ -572,8 +578,7 @@ def force_from_mate(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wre
     moment = wrench_moment(on, pin)
     dx, dy = pin.x - other.x, pin.y - other.y
     share = (ratio - 1.0) * moment / (dx * dx + dy * dy)
-    x, y = -share * dy, share * dx
-    return Wrench(x, y, moment + pin.x * y - pin.y * x)
+    return _wrench_from_moment(pin, -share * dy, share * dx, moment)
 
 
 def force_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:

@@ -39,6 +39,11 @@ def mode_requirement(mode: Mode) -> str:
     return f"be {', '.join(words[:-1])} or {words[-1]}"
 
 
+def _make_parameters(mechanism: Mechanism, values: Mapping[str, Any]) -> Any:
+    """Return the parameters of a mechanism from ``values`` by FMI name; raise ParameterError if one is not valid."""
+    return mechanism.parameters(**{field_name(name): values[name] for name in mechanism.mechanism_variables})
+
+
 class Plant:
     """A mechanism during a simulation: its state, its inputs, and `step`, which advances the state in time.
 
@@ -119,15 +124,14 @@ class Plant:
         ------
         ParameterError, AssemblyError, InputError
         """
-        m = mechanism
         return cls(
-            m,
-            m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
-            m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
+            mechanism,
+            _make_parameters(mechanism, values),
+            mechanism.initial(**{field: values[f"initial.{field}"] for field in mechanism.initial_variables}),
             tolerance=values["solver.tolerance"] if tolerance is None else tolerance,
             time=time,
-            inputs={name: values[name] for name in m.input_names},
-            **{field_name(mode.name): values[mode.name] for mode in m.modes},
+            inputs={name: values[name] for name in mechanism.input_names},
+            **{field_name(mode.name): values[mode.name] for mode in mechanism.modes},
         )
 
     def _derive(self) -> None:
@@ -146,12 +150,11 @@ class Plant:
         ParameterError
             If a parameter is not valid; nothing is changed then.
         """
-        m = self.mechanism
-        parameters = m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables})
-        before = m.equations.energy(self.state, self._p)
+        energy, parameters = self.mechanism.equations.energy, _make_parameters(self.mechanism, values)
+        before = energy(self.state, self._p)
         self.parameters = parameters
         self._derive()
-        self.start_energy += m.equations.energy(self.state, self._p) - before
+        self.start_energy += energy(self.state, self._p) - before
 
     def _rate_names(self) -> set[str]:
         """Return the names of the inputs that command a rate in any mode."""
