@@ -25,7 +25,7 @@ JAMMED = replace(TABLE_3_1, slider_friction_coefficient=4.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("spring", "rpm"), [("a", 300.0), ("b", 580.0), *marked("long", [("b", 800.0)])])
+@pytest.mark.parametrize(("spring", "rpm"), [("b", 580.0), *marked("long", [("a", 300.0), ("b", 800.0)])])
 def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
     speed, parameters = rpm * RAD_S_PER_RPM, replace(RIG[spring], **ROUGH)
     orbit = find_orbit(parameters, speed=speed)
@@ -40,7 +40,7 @@ def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("spring", "rpm"), [("a", 240.0), ("b", 800.0), *marked("long", [("a", 500.0), ("b", 500.0)])])
+@pytest.mark.parametrize(("spring", "rpm"), [("b", 800.0), *marked("long", [("a", 240.0), ("a", 500.0), ("b", 500.0)])])
 def test_rig_1_does_not_jam_with_a_coefficient_of_a_half(spring: str, rpm: float) -> None:
     orbit = find_orbit(replace(RIG[spring], slider_friction_coefficient=0.5), speed=rpm * RAD_S_PER_RPM)
     assert orbit.clearance() > 0.5

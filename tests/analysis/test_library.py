@@ -471,7 +471,7 @@ def test_a_resonance_curve_is_that_of_the_oracle(name):
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("name", ["elastic-bearing", "shaper", "rack-and-pinion"])
+@pytest.mark.parametrize("name", ["shaper", "rack-and-pinion", *marked("long", ["elastic-bearing"])])
 def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
     case = load_case(FOLDER / f"{name}.toml")
     made = load_linkage(FOLDER / f"{name}.toml")

@@ -145,17 +145,7 @@ class TestSimilarity:
         return float(solution.error / syn.normal_form(task).unit ** 2)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize(
-        ("scale", "turned", "moved"),
-        [
-            (1e-3, 0.0, 0.0),
-            (1e3, 0.0, 0.0),
-            (1.0, 0.0, 1e3 - 2e3j),
-            (1.0, 0.0, 1e6),
-            (1.0, 0.9, 0.0),
-            (1e-3, 2.0, 1e3j),
-        ],
-    )
+    @pytest.mark.parametrize(("scale", "turned", "moved"), [(1e3, 0.0, 0.0), (1.0, 0.0, 1e6), (1e-3, 2.0, 1e3j)])
     @pytest.mark.parametrize("kind", ["timed", "closed", "open"])
     def test_it_is_done_as_well(self, kind: str, scale: float, turned: float, moved: complex) -> None:
         # the unit is the diagonal of the bounding box, which turns with the shape: compared in the size of the shape

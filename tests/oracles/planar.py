@@ -13,7 +13,6 @@ import casadi
 import numpy as np
 import pint
 from scipy.integrate import solve_ivp
-from scipy.optimize import root
 
 from analysis.linkages.description import GROUND, Description
 from linkwork.friction import FRICTION_FORCE, FRICTION_RATE, FRICTION_SPEED
@@ -115,6 +114,10 @@ class Multipliers:
         self.freedoms = casadi.vertcat(*(self.coordinate(f.joint) for f in description.freedoms.values()))
         both = casadi.vertcat(self.closure, self.freedoms)
         self.joints = casadi.Function("joints", [self.q], [both, casadi.jacobian(both, self.q)])
+        rubbed = [casadi.jacobian(self.coordinate(name), self.q) for name in description.friction]
+        self.along_friction = casadi.Function("along", [self.q], [casadi.vertcat(*rubbed)])
+        #: The size of a joint force below which its friction is that of a force of this size.
+        self.least = min(FRICTION_FORCE, 0.1 * sum(self.mass(name)[0] for name in self.bodies))
 
     def pose(self, body: str) -> Any:
         """Return the place (x, y, angle) of a body."""
@@ -306,9 +309,8 @@ class Multipliers:
     def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
         """Return the friction of each joint per newton of joint force: along its coordinate, and in all coordinates."""
         found = {}
-        for name, value in self.d.friction.items():
-            measure, slow = self.coordinate(name), FRICTION_RATE if name in self.owners else FRICTION_SPEED
-            along = self.value(casadi.jacobian(measure, self.q), q)
+        for (name, value), along in zip(self.d.friction.items(), np.asarray(self.along_friction(q))):
+            slow = FRICTION_RATE if name in self.owners else FRICTION_SPEED
             rub = -number(value) * float(np.tanh(along @ v / slow))
             found[name] = rub, rub * along
         return found
@@ -328,7 +330,7 @@ class Multipliers:
         torques on bodies and forces of driven springs, by name.
         """
         acting = self.given(points, forces)
-        j = np.asarray(self.equations(q, np.zeros(len(q)), acting)[0])
+        j = np.asarray(self.joints(q)[1])
         size, count = self.closure.numel(), self.freedoms.numel()
         v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))
         j, d, m, right, energy = (np.asarray(a) for a in self.equations(q, v, acting))
@@ -342,14 +344,13 @@ class Multipliers:
         matrix[: len(q), len(q) :] = -constraints.T
         matrix[len(q) :, : len(q)] = constraints
         wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
-        rubbing, least = self.rubbing(q, v), min(FRICTION_FORCE, 0.1 * sum(self.mass(name)[0] for name in self.bodies))
+        rubbing = self.rubbing(q, v)
         columns = [np.concatenate([right[:, 0] + along[free].T @ loads[free], wanted])]
         columns += [np.concatenate([rub, np.zeros(len(wanted))]) for _, rub in rubbing.values()]
         responses = refined_solve(matrix, np.array(columns).T)
 
-        def joints_of(sizes: np.ndarray) -> dict[str, np.ndarray]:
-            """The joint forces where those that make friction have these sizes."""
-            multipliers = (responses @ [1.0, *sizes])[len(q) :]
+        def joints_of(multipliers: np.ndarray) -> dict[str, np.ndarray]:
+            """The joint forces, which are linear in the multipliers."""
             joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
             for name, gear in self.d.gears.items():
                 self.share(joints, q, gear, float(joints[name][0]))
@@ -357,18 +358,27 @@ class Multipliers:
                 self.pull(joints, q, rack, float(joints[name][0]))
             return joints
 
-        def made(sizes: np.ndarray) -> np.ndarray:
-            joints = joints_of(sizes)
-            parts = [joints[name] if name in self.owners else joints[name][:1] for name in rubbing]
-            return np.array([np.hypot(least, np.linalg.norm(part)) for part in parts])
+        sizes = np.zeros(len(rubbing))
+        if rubbing:
+            of = [joints_of(column) for column in responses[len(q) :].T]
+            parts = [np.array([c[name] if name in self.owners else c[name][:1] for c in of]) for name in rubbing]
 
-        sizes = made(np.zeros(len(rubbing)))
-        for _ in range(2 if rubbing else 0):
-            scale = sizes
-            sizes = scale * root(lambda z, scale=scale: made(scale * z) / scale - z, np.ones(len(sizes)), tol=1e-15).x
-        assert np.abs(made(sizes) - sizes).max(initial=0.0) < 1e-10 * sizes.max(initial=1.0)
-        solution, joints = responses @ [1.0, *sizes], joints_of(sizes)
+            def made(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                """The sizes of the joint forces that make friction where they have these sizes, and their derivatives."""
+                forces = [[1.0, *sizes] @ part for part in parts]
+                found = np.array([np.hypot(self.least, np.linalg.norm(force)) for force in forces])
+                return found, np.array([part[1:] @ force for part, force in zip(parts, forces)]) / found[:, None]
+
+            for _ in range(50):
+                found, slopes = made(sizes)
+                change = np.linalg.solve(np.eye(len(sizes)) - slopes, found - sizes)
+                sizes = sizes + change
+                if np.abs(change).max() < 1e-14 * sizes.max():
+                    break
+            assert np.abs(made(sizes)[0] - sizes).max() < 1e-10 * sizes.max()
+        solution = responses @ [1.0, *sizes]
         multipliers = solution[len(q) :]
+        joints = joints_of(multipliers)
         rubbed = sum((size * rub for size, (_, rub) in zip(sizes, rubbing.values())), np.zeros(len(q)))
         accelerations = along @ solution[: len(q)] + d[size:, 0]
         all_loads = loads.copy()
@@ -376,6 +386,31 @@ class Multipliers:
         along_slots = {name: size * rubbing[name][0] for name, size in zip(rubbing, sizes) if name in self.d.slots}
         lost = -float(rubbed @ v)
         return Solution(accelerations, all_loads, joints, float(energy[0, 0]), along_slots, lost, solution[: len(q)])
+
+    def motion(self, commanded: tuple[int, ...]) -> Any:
+        """Return a function of coordinates and rates of the freedoms, a guess, loads and what `given` returns.
+
+        It returns accelerations and places where no joint has friction.
+        """
+        size, count, total = self.closure.numel(), self.freedoms.numel(), 3 * len(self.bodies)
+        free = [n for n in range(count) if n not in commanded]
+        x, rates, loads = (casadi.MX.sym(name, count) for name in ("x", "rates", "loads"))
+        guess, given = casadi.MX.sym("guess", total), casadi.MX.sym("given", self.equations.numel_in(2))
+        wanted = casadi.SX.sym("wanted", count)
+        error = casadi.vertcat(self.closure, self.freedoms - wanted)
+        place = casadi.Function("place", [self.q, wanted], [error])
+        q = casadi.rootfinder("placed", "newton", place, {"abstol": 1e-13, "max_iter": 20})(guess, x)
+        v = casadi.solve(self.joints(q)[1], casadi.vertcat(casadi.MX(size, 1), rates), "qr")
+        j, drift, mass, force, _ = self.equations(q, v, given)
+        constraints = j[[*range(size), *(size + n for n in commanded)], :]
+        held = casadi.MX(constraints.shape[0], constraints.shape[0])
+        matrix = casadi.blockcat([[mass, -constraints.T], [constraints, held]])
+        right = casadi.vertcat(force, -drift[:size], *(-drift[size + n] for n in commanded))
+        if free:
+            right[:total] += casadi.mtimes(j[[size + n for n in free], :].T, loads[free])
+        solution = casadi.solve(matrix, right, "qr")
+        accelerations = casadi.mtimes(j[size:, :], solution[:total]) + drift[size:]
+        return casadi.Function("motion", [x, rates, guess, loads, given], [accelerations, q])
 
     def on_bodies(
         self, solution: Solution, pulls: Mapping[str, float], q: np.ndarray
@@ -419,12 +454,16 @@ class Multipliers:
         """
         n, last = len(coordinates), [guess]
         points = {load.point: (0.0, 0.0) for load in self.d.loads}
-        acting = np.zeros(n) if loads is None else loads
+        acting, given = np.zeros(n) if loads is None else loads, self.given(points, forces or {})
+        motion = self.motion(commanded)
 
         def derivative(t: float, z: np.ndarray) -> np.ndarray:
-            last[0] = self.placed(z[:n], last[0])
-            found = self.solve(last[0], z[n:], acting, dict.fromkeys(commanded, 0.0), points, forces or {})
-            return np.concatenate([z[n:], found.accelerations])
+            if self.d.friction:
+                last[0] = self.placed(z[:n], last[0])
+                found = self.solve(last[0], z[n:], acting, dict.fromkeys(commanded, 0.0), points, forces or {})
+                return np.concatenate([z[n:], found.accelerations])
+            accelerations, last[0] = motion(z[:n], z[n:], last[0], acting, given)
+            return np.concatenate([z[n:], np.asarray(accelerations)[:, 0]])
 
         start, span = np.concatenate([coordinates, rates]), (time[0], time[-1])
         z = solve_ivp(derivative, span, start, method="DOP853", t_eval=time, rtol=1e-11, atol=1e-12).y
