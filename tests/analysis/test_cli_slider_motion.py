@@ -282,8 +282,9 @@ def test_an_open_path_is_placed_by_itself(tmp_path) -> None:
     t = np.linspace(0.3, 2.4, 40)
     points = BASE.path(t).tolist()
     task = {"kind": "untimed-path", "points": points, "closed": False, "measure": "distance"}
-    chosen = read(tmp_path, tables(task=task))
+    chosen = read(tmp_path, tables(task=task, drive={"speed": "60 rpm"}))
     four_bar = chosen.find_four_bar()
+    assert chosen.compute_drive(four_bar).crank_speed == pytest.approx(2.0 * pi)
     assert four_bar.evaluation.worst < 1e-5
     ends = np.exp(1j * four_bar.evaluation.rotation[[0, -1]])
     assert ends == pytest.approx(np.exp(1j * t[[0, -1]]), abs=1e-3)
@@ -291,13 +292,10 @@ def test_an_open_path_is_placed_by_itself(tmp_path) -> None:
 
 
 def test_a_path_that_is_traced_clockwise_is_driven_so(tmp_path) -> None:
-    t = np.linspace(0.3, 2.4, 40)
-    task = {"kind": "untimed-path", "points": BASE.path(t).tolist(), "closed": False, "measure": "distance"}
-    back = task | {"points": task["points"][::-1]}
-    drive = {"speed": "60 rpm"}
-    for turned, sign in ((task, 1.0), (back, -1.0)):
-        chosen = read(tmp_path, tables(task=turned, drive=drive))
-        assert chosen.compute_drive(chosen.find_four_bar()).crank_speed == pytest.approx(sign * 2.0 * pi)
+    points = BASE.path(np.linspace(2.4, 0.3, 40)).tolist()
+    task = {"kind": "untimed-path", "points": points, "closed": False, "measure": "distance"}
+    chosen = read(tmp_path, tables(task=task, drive={"speed": "60 rpm"}))
+    assert chosen.compute_drive(chosen.find_four_bar()).crank_speed == pytest.approx(-2.0 * pi)
 
 
 def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -> None:
@@ -339,7 +337,8 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         raise slider.StrategyInterrupted(replace(found, steps=found.steps[:1], met=False))
 
     monkeypatch.setattr("analysis.slider.cases.simplest_mechanism", stopped)
-    strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
+    # the four-bar would be good enough, so that nothing else is sought
+    strategy = {"tolerance": "1 m", "harmonics": 1, "ratios": [], "starts": 2}
     result = linkwork(tables(strategy=strategy, slider={}), "--no-plots", code=cli.INTERRUPTED)
     assert "none meets the tolerance so far; the nearest is kept: four-bar" in result.output
     assert "stopped after 1 mechanism; the best so far is kept" in result.output
