@@ -82,15 +82,25 @@ def fresh_solver() -> Iterator[None]:
     on_device.solver.cache_clear()
 
 
+@pytest.fixture(scope="module")
+def solvers() -> dict[Any, Any]:
+    """Solvers for this processor in the place of a device, by their functions, which are compiled once."""
+    return {}
+
+
 @pytest.fixture
-def without_device(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_device(monkeypatch: pytest.MonkeyPatch, solvers: dict[Any, Any]) -> None:
     """CuPy without a device: this processor runs the same kernel."""
     cuda = device.Cuda
 
     def make(function: Any, equations: Any) -> device.Cuda:
-        made = none.Processor(device.compile_kernel(function), equations)
-        monkeypatch.setitem(sys.modules, "cupy", none.cupy(made))
-        return cuda(function, equations)
+        key = (function, *(equation.serialize() for equation in equations))
+        if key not in solvers:
+            made = none.Processor(device.compile_kernel(function), equations)
+            monkeypatch.setitem(sys.modules, "cupy", none.cupy(made))
+            solvers[key] = cuda(function, equations)
+        solver: device.Cuda = solvers[key]
+        return solver
 
     monkeypatch.setattr(device, "Cuda", make)
 
