@@ -250,7 +250,7 @@ def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> Iterat
         "an arrangement that is simple in principle but suffers from the defects of limited adaptability and "
         "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
         "7.1.1 (a), L5301-5309",
-        "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
+        "smallest plate cam for the best two harmonics of Figs 7.11 and 7.12, with a pressure angle within 30 deg, the usual "
         "limit: least radius of curvature of the path of the roller's centre where this path is convex. For a secondary "
         "linkage, our example is a Scotch yoke: weighted error of the rocker function with one harmonic, relative to that "
         "with the pivot fixed",

@@ -183,15 +183,17 @@ def judge_qualities(timed: Quality, path: Quality, found: Quality) -> Iterator[S
         "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
         "planar linkage yielding in all cases a minimum.",
         "6.5, L5136",
-        "error of the printed linkage, mended, relative to the error at the end of a descent from it. The descent has at most "
-        f"{STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within the printed bounds. "
-        "Rounding changes its course: the ratios other than 1 differ by up to 4 % from machine to machine, and grow with "
-        "more steps",
+        "error of the printed linkage, mended, relative to the error at the end of a descent from it. At Figs 6.7 and 6.8 it "
+        "is the error in that reading of Fig 6.7 which we choose because both linkages are minima in it. The descent has at "
+        f"most {STEPS} steps, makes no link longer than the longest printed one, and at Fig 6.6 stays within the printed "
+        "bounds. Rounding changes its course: the ratios other than 1 differ by up to 4 % from machine to machine, and grow "
+        "with more steps",
         f"{1.0 + ALIKE:g}, the rule for *the same*, since at a minimum there is no descent",
         *(at_most(name, 1.0 + ALIKE, ratio, why="it is not a minimum") for name, ratio in ratios.items()),
         unjudged("Fig 6.11", "its nineteen points are lost"),
         unjudged("other types of linkage", "none is given"),
-        why="how well they generate the outputs is judged at Figs 6.4 to 6.9",
+        why="in most other readings of the weighted error the linkage of Fig 6.8 is no minimum; how well they generate the "
+        "outputs is judged at Figs 6.4 to 6.9",
     )
     yield statement(
         "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
