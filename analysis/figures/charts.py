@@ -25,6 +25,8 @@ from .style import COLOURS, LIGHT, label_in_words, legend_above, name_in_words
 EMPTY = "0.82"
 #: Hatchings of the classes in order, so that they can be told apart without colours; and hatching of unstable points.
 _HATCHES, _UNSTABLE = ("", "//", "xx", "..", "--", "||"), "////"
+#: Colour of hatchings, darker than all colours of a map except the greatest values.
+_HATCHING = "0.2"
 #: Size of a chart of a result (inches).
 _SIZE = 7.2, 4.6
 #: Classes of points by the number of stable motions, with their colours; class numbers for no, one and several stable motions.
@@ -114,7 +116,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
             # the level 0.5 lies halfway between hatched and other points
             area = axis.contourf(chart.x, chart.y, points, levels=[0.5, 1.5], colors="none", hatches=[hatch])
             # the hatching has the colour of the edge, which is not drawn
-            area.set(edgecolor="0.45", linewidth=0.0)
+            area.set(edgecolor=_HATCHING, linewidth=0.0)
     axis.grid(False)
     draw_panel(axis, chart.panel)
     if not chart.classes:
@@ -124,7 +126,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
         scale.grid(False)
     handles, labels = axis.get_legend_handles_labels()
     for colour, hatch, name in legend_entries(chart):
-        handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor="0.45", linewidth=0.0))
+        handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor=_HATCHING, linewidth=0.0))
         labels.append(name)
     if not handles:
         return

@@ -200,7 +200,7 @@ def draw(picture: Picture) -> style.Figure:
     rows = ceil(len(parts) / columns)
     heights = picture.heights or [1.0] * rows
     figure = style.Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
-    FigureCanvasAgg(figure)  # measures all texts with one renderer, instead of a new one each
+    FigureCanvasAgg(figure)  # measures all texts with one renderer
     axes = figure.subplots(
         rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
     )

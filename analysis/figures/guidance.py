@@ -63,7 +63,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
             panel.set_title(f"{number}: {_verdict(solution)}", fontsize=style.SMALL)
         for panel in panels[count:]:
             panel.set_visible(False)
-    said = "Thick: the crank, in the colour of its link above. Thin triangle: the body with its point."
+    said = "Thick: the crank, in the colour of its link above. Thin triangle: the body with its point. Lengths in mm."
     return place_marks(style.finish(figure, f"{title}: {found.describe()}".removeprefix(": "), [said]))
 
 

@@ -63,9 +63,11 @@ def plot_outputs(run: Trajectory, names: Sequence[str] | None = None, *, title: 
     require_list(names, "names")
     table, drawer = _variables(run), None
     notes: list[str] = []
-    if names is None:
+    if len(run) == 0:
+        panels = [_Rows(name="the run has no samples", unit="", curves={})]
+    elif names is None:
         panels, notes = _without_constants(_default_rows(run, table))
-        drawer = mechanism_drawer(run.parameters) if len(run) > 0 else None
+        drawer = mechanism_drawer(run.parameters)
     else:
         panels = [_output_row(run, table, name) for name in names]
     if run.status:
@@ -175,9 +177,12 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
 
 
 def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: str = "", line: Any = "-") -> None:
-    """Draw a curve over time; if it oscillates too fast to be drawn, draw the band of its values and its mean."""
+    """Draw a curve over time; if it oscillates too fast to be drawn, draw the band of its values and its mean.
+
+    A curve that varies by rounding only is drawn as constant, and a single sample as a point.
+    """
     if not is_fast(values):
-        axis.plot(time, values, line, label=label or None)
+        axis.plot(time, without_rounding(values), line, marker="o" if len(values) == 1 else None, label=label or None)
         return
     parts = np.array_split(np.arange(len(values)), min(_BANDS, _oscillations(values) // 2))
     middle = np.array([time[part].mean() for part in parts])
@@ -192,7 +197,7 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
 
 def is_fast(values: FloatArray) -> bool:
     """Return whether a curve oscillates so often that a panel would show a block of colour."""
-    return _oscillations(values) > _FAST
+    return _oscillations(without_rounding(values)) > _FAST
 
 
 def _oscillations(values: FloatArray) -> int:
@@ -261,7 +266,7 @@ def _without_constants(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]
         # "pin force A" of the panel "pin forces"
         names = {name: f"{panel.name.removesuffix('s')} {name}" if name else panel.name for name in panel.curves}
         still += [
-            f"{names[name]} {_constant_text(values)} {panel.unit}"
+            f"{names[name]} {_mean_of_constant(values):.4g} {panel.unit}"
             for name, values in panel.curves.items()
             if name not in curves
         ]
@@ -276,10 +281,15 @@ def _is_constant(values: FloatArray) -> bool:
     return len(values) == 0 or bool(np.ptp(values) <= _STILL * max(1.0, float(np.abs(values).max())))
 
 
-def _constant_text(values: FloatArray) -> str:
-    """Return the mean of a constant curve as text; values below the resolution give "0"."""
+def _mean_of_constant(values: FloatArray) -> float:
+    """Return the mean of a constant curve, and 0 if it is below the resolution."""
     mean = float(values.mean()) if len(values) else 0.0
-    return f"{mean:.4g}" if abs(mean) > _STILL else "0"
+    return mean if abs(mean) > _STILL else 0.0
+
+
+def without_rounding(values: FloatArray) -> FloatArray:
+    """Return the values of a curve in display units; those of a constant curve are its mean, without rounding errors."""
+    return np.full_like(values, _mean_of_constant(values)) if _is_constant(values) else values
 
 
 @style.figure_style()
@@ -317,7 +327,7 @@ def plot_comparison(
     rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
     for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
         for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
-            axes[0].plot(time, values, line, color=colour, label=label)
+            axes[0].plot(time, without_rounding(values), line, color=colour, label=label)
         axes[0].set_ylabel(style.axis_label(name, unit))
         if beside:
             _draw_difference(axes[1], time, b - a, unit, size)

@@ -112,7 +112,9 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
     """Draw a part; ``through`` are the positions of its joints (mm), ``unit`` the size of symbols (mm)."""
     first, last = through[0], through[-1]
     if part.kind == "link":
-        symbols.draw_link(axis, through, colour)
+        # a shorter link over a longer one, which would hide it in a position in which both lie on a line
+        length = float(np.linalg.norm(through[1] - first))
+        symbols.draw_link(axis, through, colour, zorder=6.0 + unit / (unit + length))
     elif part.kind == "pivot":
         symbols.draw_bearing(axis, first, unit)
     elif part.kind == "slider":

@@ -114,13 +114,18 @@ def _force_panel(
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
     curves, inside = [], []
-    for label, given in components.items():
+    for (label, given), line in zip(components.items(), style.LINES):
         values = np.array(np.ma.filled(given, np.nan)) / factor
         inside.append(values[np.isfinite(values) & (turn.clear() | (not grows))])
         # a gap at each pole, where a curve changes its sign
         values[[int(np.argmin(np.abs(turn.angle - place.crank_angle))) for place in poles]] = np.nan
         curves.append(
-            Curve(x=_insert_breaks(angle, turn.breaks, angle), y=_insert_breaks(values, turn.breaks), label=label)
+            Curve(
+                x=_insert_breaks(angle, turn.breaks, angle),
+                y=_insert_breaks(values, turn.breaks),
+                label=label,
+                line=line,
+            )
         )
     limits = None
     if np.concatenate(inside).size:

@@ -318,6 +318,7 @@ class _Scene:
             x_lines=[line[0] for line in self.lines], y_lines=[line[1] for line in self.lines],
             xlims=(self.low[0] + 0.5 * u, self.high[0] - 0.5 * u), ylims=(self.low[1], self.high[1]),
             margin=0.003, min_distance=0.005, nbr_candidates=500,
+            avoid_label_lines_overlap=True, avoid_crossing_label_lines=True,
             textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=style.HAIR,
             plot_kwargs={"zorder": 11}, zorder=12, path_effects=[withStroke(linewidth=2.4, foreground="white")],
         )  # fmt: skip
@@ -474,6 +475,8 @@ def _plot_slider_position(axis: Axes, parts: Sequence[_Part], unit: str) -> None
             # a range may begin before zero and reach beyond a turn
             shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
             axis.plot(shown, place.slide, marker, color=colour, markersize=style.DOT, zorder=6)
+    if parts:
+        style.tick_quarter_turns(axis, *np.degrees([parts[0].angles[0], parts[-1].angles[-1]]))
     axis.set_xlabel("crank angle [deg]")
     axis.set_ylabel(f"slider position [{unit}]")
 

@@ -14,7 +14,9 @@ import matplotlib.style
 from cycler import cycler
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import ScaledTranslation
 
 __all__ = ["COLOURS", "STYLE", "Figure", "figure_style", "finish"]
@@ -46,6 +48,9 @@ STYLE: dict[Any, Any] = {
     "figure.titleweight": "bold",
     "font.family": "DejaVu Sans",  # comes with Matplotlib: the same picture on every machine
     "font.size": PLAIN,
+    "axes.formatter.limits": (-4, 6),
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,  # 40.362 and 40.364 instead of 2 and 4 and "+4.036e1"
     "axes.grid": True,
     "axes.prop_cycle": cycler(color=COLOURS),
     "axes.spines.top": False,
@@ -66,6 +71,8 @@ REFERENCE: dict[str, Any] = {"color": "0.6", "linewidth": HAIR, "zorder": 1}
 MARK: dict[str, Any] = {"color": "0.35", "linewidth": THIN, "linestyle": ":", "zorder": 1}
 #: Letters per inch of a figure's title, and of notes.
 _LETTERS, _NOTED = 11.6, 15.0
+#: Greatest number of times that a figure is laid out, and distance of its numbers and labels from its edge (inches).
+_ROUNDS, _EDGE = 4, 0.02
 
 
 def name_in_words(name: str) -> str:
@@ -123,15 +130,36 @@ def finish(figure: Figure, title: str = "", notes: Sequence[str] = ()) -> Figure
     """
     write_title(figure, title)
     write_notes(figure, notes)
+    if not isinstance(figure.canvas, FigureCanvasAgg):
+        FigureCanvasAgg(figure)  # measures all texts with one renderer, instead of a new one each
+    for axis in figure.axes:
+        for part in (axis.xaxis, axis.yaxis):
+            # if no size is set, Matplotlib chooses other ticks when the figure is drawn, by the user's own settings
+            if "labelsize" not in part.get_tick_params():
+                part.set_tick_params(labelsize=PLAIN)
     engine = figure.get_layout_engine()
     if engine is None:
         figure.draw_without_rendering()
     else:
-        engine.execute(figure)
+        for _ in range(_ROUNDS):
+            engine.execute(figure)
+            if not _has_cut_drawing(figure):
+                break
         # with any layout engine, even "none", a figure is drawn twice when it is saved
         with rc_context({"figure.constrained_layout.use": False}):
             figure.set_layout_engine(None)
     return figure
+
+
+def _has_cut_drawing(figure: Figure) -> bool:
+    """Return whether numbers or labels of axes to scale are at the edge of a figure.
+
+    Axes to scale are smaller than the place that a layout gives them; the next layout takes this into account.
+    """
+    edge = _EDGE * figure.dpi
+    drawings = [axis for axis in figure.axes if axis.axison and axis.get_aspect() != "auto"]
+    boxes = [part.get_tightbbox() for axis in drawings for part in (axis.xaxis, axis.yaxis)]
+    return any(box is not None and min(box.x0, box.y0) < edge for box in boxes)
 
 
 def frame_drawing(axis: Axes, low: Any, high: Any) -> None:
@@ -146,6 +174,12 @@ def use_one_scale(axis: Axes, adjustable: Any = "datalim") -> None:
     """Give both axes of a drawing, in mm, the same scale; ``adjustable`` is that of Matplotlib's ``set_aspect``."""
     axis.set_aspect("equal", adjustable=adjustable)
     axis.set(xlabel="x [mm]", ylabel="y [mm]")
+
+
+def tick_quarter_turns(axis: Axes, low: float, high: float) -> None:
+    """Put the ticks of the x axis at quarter turns, if its angles (deg) range over half a turn to two turns."""
+    if 180.0 <= high - low <= 720.0:
+        axis.xaxis.set_major_locator(MultipleLocator(90.0))
 
 
 def align_labels(axes: Sequence[Axes]) -> None:

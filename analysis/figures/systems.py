@@ -87,7 +87,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         # above the axes, as the curves fill them
         axes[-1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=style.TINY, borderaxespad=0.2)
     axes[-1].set_xlabel("time [s]")
-    fast = any(is_fast(values) for values in (*(run[name] for name in names), *run.powers.values()))
+    fast = any(is_fast(values) for values in (*(run.unwrapped(name) for name in names), *run.powers.values()))
     return style.finish(figure, title or f"{run.title}, coupling: {run.coupling}", [BANDS] if fast else [])
 
 

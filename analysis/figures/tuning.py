@@ -62,7 +62,9 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
         for quantity, scaled in [display_scale(parameter_unit(tuned.wish.mechanism, name))]
     ]
-    return plot_curves(panels, title=title, notes=[f"Changed: {', '.join(changed)}. Dashed: unstable.", *tuned.missed])
+    return plot_curves(
+        panels, title=title, notes=[f"Changed: {', '.join(changed)}.", "Dashed: unstable.", *tuned.missed]
+    )
 
 
 def _view_range(curves: Sequence[Curve]) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from analysis import Inputs, figures, simulate, simulate_many
 from analysis.figures import Curve, Panel, scheme, style
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
-from analysis.figures.style import GROUND
+from analysis.figures.style import COUPLER, CRANK, GROUND
 from analysis.files import WritingError, save_figure
 from analysis.linkages import linkage
 from analysis.mechanisms import MECHANISMS
@@ -120,6 +120,32 @@ def test_a_run_in_which_nothing_changes_says_so(run) -> None:
     assert labels_of(figure) == []
     assert [text.get_text() for text in figure.axes[0].texts] == ["nothing changes in this run"]
     assert "pin force A" in figure.get_supxlabel()
+
+
+def test_a_run_without_samples_says_so_and_a_single_sample_is_a_point(run) -> None:
+    empty, single = (replace(run, time=run.time[:n], values=run.values[:n]) for n in (0, 1))
+    figure = figures.plot(empty)
+    assert "no samples" in figure.axes[0].texts[0].get_text()
+    assert not figure.get_supxlabel()
+    assert figures.plot(single, ["slider.position"]).axes[0].lines[0].get_marker() == "o"
+
+
+@pytest.mark.parametrize(("name", "value"), [("crank.speed", 44.0), ("slider.position", 0.0)])
+def test_rounding_errors_of_a_constant_are_not_magnified(run, name: str, value: float) -> None:
+    values = run.values.copy()
+    noise = np.random.default_rng(1).standard_normal(len(run))
+    values[:, run.names.index(name)] = value + 1e-15 * noise * max(value, 1.0)
+    low, high = figures.plot(replace(run, values=values), [name]).axes[0].get_ylim()
+    assert high - low > 0.05 * max(abs(high), 1.0)
+
+
+def test_no_label_of_a_drawing_to_scale_is_cut_off() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 100)
+    curve = Curve(x=77.0 + 63.0 * np.cos(turn), y=36.0 * np.sin(turn) - 57.0, label="slider moved,\n3 harmonics")
+    panel = Panel(x_label="x [mm]", y_label="y [mm]", curves=[curve], equal=True, legend_at="outside")
+    figure = figures.plot_curves([panel], title="to scale", size=(6.4, 3.0))
+    box = figure.axes[0].yaxis.label.get_window_extent()
+    assert box.x0 > 0.02 * figure.dpi
 
 
 @pytest.mark.parametrize("outputs", [None, ["slider.position", "pin.A.fx"]])
@@ -270,8 +296,8 @@ def test_names_of_places_cover_no_curve(height: float) -> None:
 def test_the_look_does_not_depend_on_the_users_settings(run, tmp_path: Path) -> None:
     plain = save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
     with matplotlib.rc_context({"font.size": 20.0, "axes.grid": False, "lines.linewidth": 7.0, "xtick.labelsize": 3.0}):
-        own = figures.plot(run)
-    assert save_figure(own, tmp_path / "b.png").read_bytes() == plain
+        own = save_figure(figures.plot(run), tmp_path / "b.png").read_bytes()
+    assert own == plain
 
 
 @pytest.mark.parametrize(
@@ -453,6 +479,12 @@ def test_letters_of_a_described_linkage_cover_no_line_and_no_block(name: str) ->
     blocks = [patch.get_window_extent() for patch in axis.patches if patch.get_facecolor() == to_rgba(style.BLOCK)]
     assert len(blocks) == (2 if name == "elastic-bearing" else 0)
     assert not any(block.overlaps(box) for block in blocks for box in boxes)
+
+
+def test_a_crank_in_line_with_its_coupler_is_seen() -> None:
+    axis = figures.plot(linkage("klann")).axes[0]
+    crank, coupler = ([line.get_zorder() for line in axis.lines if line.get_color() == c] for c in (CRANK, COUPLER))
+    assert min(crank) > max(coupler)
 
 
 def test_only_the_letter_of_its_pin_stands_on_the_block_of_a_five_bar() -> None:
