@@ -90,7 +90,9 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
                 )
     stem = common.output_folder(out) / f"{Path(record).stem}-decrement"
     columns = {"time [s]": decay.time, f"position [{unit}]": decay.position, f"fit [{unit}]": decay.fitted}
-    drawn = common.save_plot(plot, decay, f"{stem}.png", (t[kept], x[kept]), unit=unit, title=Path(record).name)
+    drawn = common.save_plot(
+        plot, decay, f"{stem}.png", (t[kept], x[kept]), unit=unit, title=f"Free decay, {Path(record).stem}"
+    )
     common.print_paths([write_csv(f"{stem}.csv", columns), *drawn])
 
 

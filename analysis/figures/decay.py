@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..numerics.decay import Decay
+from ..units import display_scale
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .style import COLOURS, Figure
@@ -27,23 +28,28 @@ def plot_decay(
     record : (array_like, array_like), optional
         Times (s) and positions from which the decay was found.
     unit : str
-        Unit of the positions.
+        Unit of the positions; lengths in m are shown in mm, angles in rad in degrees.
     title : str
     """
-    curves = [] if record is None else [Curve(x=record[0], y=record[1], label="record", colour=COLOURS[0])]
+    shown, factor = display_scale(unit)
+    label = f"position [{shown}]" if unit else "position"
+    curves = []
+    if record is not None:
+        curves.append(Curve(x=record[0], y=factor * np.asarray(record[1]), label="record", colour=COLOURS[0]))
     points: dict[str, Any] = {"line": "", "marker": "o", "colour": COLOURS[1]}
     fit: dict[str, Any] = {"line": "--", "colour": "0.35"}
     if decay.whole:
-        curves.append(Curve(x=decay.time, y=decay.fitted, label="fit", **fit))
-        panel = Panel(x_label="time [s]", y_label=f"position [{unit}]" if unit else "position", curves=curves)
+        curves.append(Curve(x=decay.time, y=factor * decay.fitted, label="fit", **fit))
+        panel = Panel(x_label="time [s]", y_label=label, curves=curves)
         return plot_curves([panel], title=title)
-    curves.append(Curve(x=decay.time, y=decay.position, label="turning points", **points))
+    curves.append(Curve(x=decay.time, y=factor * decay.position, label="turning points", **points))
     curves += [
-        Curve(x=decay.time[side::2], y=decay.fitted[side::2], label="" if side else "fit", **fit) for side in (0, 1)
+        Curve(x=decay.time[side::2], y=factor * decay.fitted[side::2], label="" if side else "fit", **fit)
+        for side in (0, 1)
     ]
     cycles = np.arange(1, len(decay.cycle_decrements) + 1)
     panels = [
-        Panel(x_label="time [s]", y_label=f"position [{unit}]" if unit else "position", curves=curves),
+        Panel(x_label="time [s]", y_label=label, curves=curves),
         Panel(
             x_label="swing",
             x_ticks=cycles.tolist(),

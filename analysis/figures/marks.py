@@ -22,7 +22,7 @@ _GID, _LABEL = "mark", "label"
 #: Look of the names and texts; the position of each is an offset from its line or point.
 _TEXT: dict[str, Any] = {"textcoords": "offset points", "fontsize": TINY, "color": MARKED}
 #: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
-_TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
+_TOPS, _GAP = np.linspace(1.0, 0.2, 33), 2.0
 FloatArray: TypeAlias = NDArray[np.float64]
 _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")

@@ -10,6 +10,7 @@ from click.testing import Result
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from analysis import figures
 from analysis.numerics.decay import fit_decay
 from linkwork.errors import InputError, LinkworkError
 
@@ -291,3 +292,11 @@ class TestCommand:
         self.write("t,u")
         assert words in " ".join(run(*options, code=code).split())
         assert not Path("out").exists()
+
+
+def test_a_decay_in_metres_is_shown_in_millimetres() -> None:
+    time = np.linspace(0.0, 2.0, 2001)
+    record = 3e-3 * np.exp(-1.2 * time) * np.cos(38.0 * time)
+    axis = figures.plot(fit_decay(time, record), (time, record), unit="m").axes[0]
+    assert axis.get_ylabel() == "position [mm]"
+    assert all(1.0 < np.abs(line.get_ydata()).max() < 3.1 for line in axis.lines)

@@ -482,7 +482,9 @@ def test_letters_of_a_described_linkage_cover_no_line_and_no_block(name: str) ->
 
 
 def test_a_crank_in_line_with_its_coupler_is_seen() -> None:
-    axis = figures.plot(linkage("klann")).axes[0]
+    from analysis.linkages import load_linkage
+
+    axis = figures.plot(load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / "klann.toml")).axes[0]
     crank, coupler = ([line.get_zorder() for line in axis.lines if line.get_color() == c] for c in (CRANK, COUPLER))
     assert min(crank) > max(coupler)
 

@@ -480,7 +480,7 @@ def draw_harmonics(result: StudyResult) -> Figure:
         panels.append(
             Panel(
                 x_label="crank speed [rpm]",
-                y_label="amplitude of the harmonic / l4",
+                y_label="amplitude of the harmonic / $l_4$",
                 title=f"rig 2, {name}",
                 curves=[*curves, points],
                 verticals=rigs.marks(spring, 1, 2, 3),
