@@ -204,11 +204,12 @@ def compute_first() -> StudyResult:
                 why=f"at 1.5, our choice, the distance would be {below[1.5]:.2f} rad/s",
             ),
             statement(
-                "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
+                "[T]heir [the resonances'] deviation from the idealised spring-mass system accounts for the oscillating "
+                "inertia of the rocker.",
                 "4.5.1, L3143-3146",
                 "distance of the resonance below omega_k that follows from the mean of M alone, divided by the distance of "
-                "the lower root of the determinant. The mean of M exceeds 1 by the rocker's inertia. *Oscillating inertia "
-                "of the rocker* is read as the inertia of the rocker, which oscillates",
+                "the lower root of the determinant. The mean of M exceeds 1 by the rocker's inertia. *Accounts for* is read as "
+                "*is due to*, and *oscillating inertia of the rocker* as the inertia of the rocker, which oscillates",
                 ALIKE_WORDS,
                 *(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),

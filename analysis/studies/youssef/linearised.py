@@ -350,7 +350,7 @@ def _simplification() -> Iterator[Statement]:
     """Judge section 4.3: the expansion in epsilon, eqs (4.22) to (4.28)."""
     longer, shorter = (expansion_errors(x) for x in SHORT)
     left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
-    parts = printed(ratios(chapter_4(1.0)), datum(SIGMA2))
+    parts = printed(ratios(chapter_4(1.0)))
     series = (parts.spring, parts.inertia, parts.stiffness)
     # B1 to F1
     varying = max(abs(x) for one in series for x in (one.cos[1], one.sin[1]))
@@ -364,9 +364,9 @@ def _simplification() -> Iterator[Statement]:
     yield statement(
         "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
         "4.3, eq (4.22), L2801-2837",
-        "size of the means of K and F of the right linear equation, divided by the mean of the spring's factor, at the "
-        "end of each of Figs 5.1 to 5.3 where they are greatest; sigma2 = 0.05 and sigma3 = 1 unless the row names "
-        "another value, and then on the same ground link",
+        "size of the means of K and F of the right linear equation, in which the factor of the spring, k0 in the thesis, is "
+        "1, at the end of each of Figs 5.1 to 5.3 where they are greatest; sigma2 = 0.05 and sigma3 = 1 unless the row "
+        "names another value, and then on the same ground link",
         f"{SMALL:g}, the rule for *small*, as *<<* says",
         *(at_most(name, SMALL, x) for name, x in constant_parts().items()),
         why="the smallness of epsilon is not judged, since epsilon has no value",
