@@ -218,8 +218,9 @@ def compute_first() -> StudyResult:
                 "and that as [I4] increases it widens the region of resonance.",
                 "4.5.1, L3156-3162; the same in L3197-3201",
                 "amplitudes by the right equation without a damper, from 9 to 40 rad/s except within 1 rad/s of 15.5 and 2 "
-                "rad/s of 31 rad/s; then the range of speeds in which the amplitudes exceed a level. Each is relative to "
-                "its value at the next smaller I4, and the least ratio is listed. Speeds and levels are our choice",
+                "rad/s of 31 rad/s; then the range of speeds, near 31 rad/s for the first harmonic and near 15.5 rad/s for "
+                "the second, in which the amplitudes exceed a level. Each is relative to its value at the next smaller I4, "
+                "and the least ratio is listed. Speeds and levels are our choice",
                 SIGN,
                 *judge_growth(1),
                 *judge_growth(2),
@@ -434,14 +435,18 @@ def one_mass_difference(inertia_ratio: float, omega_c: float) -> float:
 @cache
 def damper_effects(inertia_ratio: float) -> dict[str, float]:
     """Return the effects of the dampers at an inertia ratio, by name; `_curves` and `_dampers` judge these effects."""
-    weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
-    outside = np.abs(SPEEDS - at) > OUTSIDE
     at_second, second_height = peak(2, inertia_ratio, DAMPERS[0])
-    outside_both = outside & (np.abs(SPEEDS - at_second) > OUTSIDE)
-    seconds = [harmonic(2, SPEEDS[outside_both], inertia_ratio, d) for d in (DAMPERS[0], STRONGEST)]
+    # with the limits of the range outside the resonances, at which the change is greatest
+    limits = at + np.array([-OUTSIDE, OUTSIDE])
+    outside = np.append(SPEEDS[np.abs(SPEEDS - at) > OUTSIDE], limits)
+    outside_both = outside[np.abs(outside - at_second) > OUTSIDE]
+    firsts, seconds = (
+        [harmonic(n, speeds, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST)]
+        for n, speeds in ((1, outside), (2, outside_both))
+    )
     return {
-        "first harmonic": np.abs(strong - weak)[outside].max() / height,
+        "first harmonic": np.abs(firsts[1] - firsts[0]).max() / height,
         "second harmonic": np.abs(seconds[1] - seconds[0]).max() / second_height,
         "of the free motion": free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0]),
         "of the peak": at_strong - at,

@@ -165,8 +165,9 @@ def enclosed_area(low: float, high: float) -> float:
     found = reached_area(low, high)
     rings = [shapely.LinearRing(ring) for ring in (*found.outer, *found.holes)]
     shapes = [shapely.build_area(shapely.GeometryCollection(rings))]
-    # dense at 0 and 180 deg, where P swings round B within half a degree at U near 0.5 and -0.5
-    turned = TURN[:-1] - 0.5 * np.sin(2.0 * TURN[:-1])
+    # dense at 0 and 180 deg, where P swings round B within half a degree at U near 0.5 and -0.5, so that a chord would add area
+    turn = np.linspace(0.0, 2.0 * pi, 7200, endpoint=False)
+    turned = turn - 0.5 * np.sin(2.0 * turn)
     for u in np.linspace(low, high, 21):
         z = coupler_point(turned, u - 1.0)
         line = shapely.LinearRing(np.column_stack([z.real, z.imag]))

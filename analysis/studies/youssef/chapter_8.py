@@ -226,7 +226,7 @@ def _amplitude_a() -> Statement:
 
 def _rounded(what: str, speeds: FloatArray) -> str:
     """Return the name ``what`` of a speed, with the range of ``speeds`` (rpm) over the rounding of the printed stiffness."""
-    return f"{what}; rounded {speeds.min():.0f} to {speeds.max():.0f}"
+    return f"{what}; rounding allows {speeds.min():.0f} to {speeds.max():.0f}"
 
 
 def _least_rise(spring: str, speeds: Sequence[float]) -> float:

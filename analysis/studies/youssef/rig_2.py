@@ -303,7 +303,7 @@ def _natural_frequencies() -> Iterator[Statement]:
         f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, the rule for *the same*, which we use for *good agreement*",
         *(
             near(
-                f"spring {s}, calculated; rounded {' to '.join(f'{speed:.1f}' for speed in around[s])}",
+                f"spring {s}, calculated; rounding allows {' to '.join(f'{speed:.1f}' for speed in around[s])}",
                 NATURAL[s][1],
                 np.clip(float(NATURAL[s][1]), min(around[s]), max(around[s])),
                 unit="rpm",

@@ -392,7 +392,9 @@ def _path() -> Iterator[Statement]:
             unit="cm2",
             why="l4 = 183.443 and A0 = 3.1 are read as misprints",
         ),
-        near(f"mended; rounded {min(span):.2f} to {max(span):.2f}", "4.3", float(np.clip(4.3, *span)), unit="cm2"),
+        near(
+            f"mended; rounding allows {min(span):.2f} to {max(span):.2f}", "4.3", float(np.clip(4.3, *span)), unit="cm2"
+        ),
         why="the 12.6 cm2 are judged at L5051, Fig 6.9",
     )
     yield statement(
