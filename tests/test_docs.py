@@ -4,11 +4,12 @@ import base64
 import json
 import pkgutil
 import re
-import shlex
 import shutil
 import sys
 import tomllib
+from contextlib import redirect_stdout
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -129,7 +130,8 @@ def test_the_readme_fits_on_two_screens():
     assert len((ROOT / "README.md").read_text().splitlines()) <= 110
 
 
-def test_the_code_of_the_readme_runs(fmus, natives, tmp_path):
+def test_the_code_of_the_readme_runs(fmus, natives, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "build").mkdir()
     for fmu in (fmus["FiveBarSlider"], natives["FiveBarSlider-native"]):
         shutil.copy(fmu, tmp_path / "build")
@@ -137,7 +139,7 @@ def test_the_code_of_the_readme_runs(fmus, natives, tmp_path):
     assert len(blocks) == 4
     for block in blocks:
         assert len(block.strip().splitlines()) <= 12
-        called(sys.executable, "-c", block, cwd=tmp_path)
+        exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
 
 
 #: Of the numbers on a page: what another machine or another release of IPOPT may make of them.
@@ -166,16 +168,18 @@ def says(found, stated):
     return True
 
 
-def run_page(name, tmp_path):
+def run_page(name, tmp_path, monkeypatch):
     """Run each command and each piece of Python of a page in turn; what the page then shows must be among what was printed.
 
-    A file that the page shows with its name is written first.
+    A file that the page shows with its name is written first. Python that is imported by the processes that it starts is run
+    with what precedes it, as the file of a reader; all else is run in this process.
 
     Gives the number of commands, the number of lines checked, and the words of what was printed, line by line.
     """
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    python, printed, checked, commands = "", [], 0, 0
+    monkeypatch.chdir(tmp_path)
+    python, names, printed, checked, commands = "", {"__name__": "__main__"}, [], 0, 0
     for kind, block in re.findall(r"```(python|sh|text|toml)\n(.*?)```", page, flags=re.DOTALL):
         if kind == "toml":
             # a first line that is the name of a file says that the reader saves it
@@ -192,22 +196,24 @@ def run_page(name, tmp_path):
             continue
         if kind == "python":
             python += block
-            (script := tmp_path / "page.py").write_text(python, encoding="utf-8")  # processes import it, as a reader's
-            runs = [[sys.executable, str(script)]]
+            if "__main__" in block:
+                (script := tmp_path / "page.py").write_text(python, encoding="utf-8")
+                said = [called(sys.executable, script, cwd=tmp_path)]
+            else:
+                with redirect_stdout(StringIO()) as output:
+                    exec(compile(block, name, "exec"), names)
+                said = [output.getvalue()]
         else:
-            runs = [
-                [sys.executable, "-m", "analysis.cli", *shlex.split(line)[1:]] for line in block.strip().splitlines()
-            ]
             assert all(line.startswith("linkwork ") for line in block.strip().splitlines())
-        for run in runs:
-            printed += [words_of(line) for line in called(*run, cwd=tmp_path).splitlines()]
-            commands += 1
+            said = [linkwork(line.removeprefix("linkwork ")).stdout for line in block.strip().splitlines()]
+        printed += [words_of(line) for text in said for line in text.splitlines()]
+        commands += len(said)
     return commands, checked, printed
 
 
 @pytest.mark.long
-def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
-    commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
+def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path, monkeypatch):
+    commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path, monkeypatch)
     assert (commands, checked) == (9, 45)
     # what the prose says
     rows = {tuple(words[:3]): words for words in printed if words[:1] == ["slider,"]}
@@ -257,9 +263,9 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("real-time.md", 2, 0, ("out/motor-tracking-host/system.h", "out/motor-tracking-host/host")),
     ],
 )
-def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_path):
+def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_path, monkeypatch):
     """The numbers of commands and of lines that are checked show that nothing was passed over."""
-    *counts, printed = run_page(page, tmp_path)
+    *counts, printed = run_page(page, tmp_path, monkeypatch)
     assert counts == [commands, checked]
     assert all((tmp_path / name).exists() for name in files)
     if page == "slider-crank.md":

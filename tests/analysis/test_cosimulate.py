@@ -134,13 +134,13 @@ def _check_random_mechanisms(fmu: str, root: str, count: int) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_fmu_and_in_process_solver_agree_on_random_mechanisms(fmu: Path) -> None:
-    found = run_in_process(_check_random_mechanisms, fmu, Path(__file__).parents[2], 100, timeout=240.0)
+    found = run_in_process(_check_random_mechanisms, fmu, Path(__file__).parents[2], 40, timeout=240.0)
     assert found["worst"][-1][0] <= 1e-6, found["worst"]
     ended = found["ended"]
-    assert len(ended) == 100
+    assert len(ended) == 40
     # those that reach the limit of assembly do so in both, at the same sample; most go on to the end, and all move
     assert all(status == other for _, _, status, other, _ in ended)
-    assert sum(status == 0 for _, _, status, _, _ in ended) > 50
+    assert sum(status == 0 for _, _, status, _, _ in ended) > 20
     assert {status for _, _, status, _, _ in ended} <= {0, 3}
     assert all("limit of assembly" in message for _, _, status, _, message in ended if status)
     assert np.mean([count for _, count, _, _, _ in ended]) > 60
