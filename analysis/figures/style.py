@@ -21,7 +21,7 @@ from matplotlib.transforms import ScaledTranslation
 
 __all__ = ["COLOURS", "STYLE", "Figure", "figure_style", "finish"]
 
-#: Colours of curves in order, which colour-blind readers can tell apart, also in grey (Okabe and Ito).
+#: Colours of curves in order, which colour-blind readers can tell apart (Okabe and Ito); in grey the first three look alike.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 #: Line styles of curves in order, for curves that may cover each other.
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":")
