@@ -136,6 +136,13 @@ def test_a_motion_of_one_turn_does_not_pass_for_one_of_several(upper: Branch) ->
     assert _repeats_early(replace(doubled, turns=4))
 
 
+def test_a_motion_of_one_turn_is_followed_over_two_turns() -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED, turns=2)
+    assert orbit.turns == 2
+    branch = follow(Family(parameters=TABLE_3_1, drive=orbit.drive), orbit, SPEED, low=0.9 * SPEED, high=1.1 * SPEED)
+    assert branch.reached, branch.reason
+
+
 def test_one_switches_at_period_doublings_and_branch_points_only(softened: Branch) -> None:
     with pytest.raises(InputError, match="is a fold: only at a period doubling or a branch point"):
         switch(softened.family, softened.special[0], low=100.0, high=1200.0)

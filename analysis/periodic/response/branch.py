@@ -359,7 +359,9 @@ def _follower(
     sizes: NDArray[np.float64] | float = 1.0,
 ) -> Follower:
     equations = OrbitEquations(family, orbit.turns, settings.low, settings.high, angles)
-    return Follower(equations, equations.scale(orbit.start) * sizes, settings, foreign=_repeats_early)
+    # a motion of one turn may be followed over two turns
+    foreign = None if _repeats_early(orbit) else _repeats_early
+    return Follower(equations, equations.scale(orbit.start) * sizes, settings, foreign=foreign)
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
