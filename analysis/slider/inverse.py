@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 #: The two components of the force at P (N): constant, or a function of the crank angle (rad).
 Load = tuple[float, float] | Callable[[float], tuple[float, float]]
 
-#: Outputs that a prescribed motion does not have, as these energies are counted from the start of a run; and those that it has.
+#: Energies that are counted from the start of a run, so that a prescribed motion does not have them; and the other outputs.
 _LEFT_OUT = ("energy.dissipated", "energy.supplied", "energy.residual")
 NAMES = tuple(name for name in FIVE_BAR.output_names if name not in _LEFT_OUT)
 _KEPT = [FIVE_BAR.output_names.index(name) for name in NAMES]
@@ -209,9 +209,10 @@ class SliderDrive:
 def slider_force(
     th2: float, u: float, w2: float, v: float, acceleration: float, load: tuple[float, float], p: Constants
 ) -> float:
-    """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed w2.
+    """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed.
 
-    ``v`` is the slider's velocity (m/s); ``load`` has the components of the force at P (N).
+    ``th2`` is the crank angle (rad), ``u`` the slider position (m), ``w2`` the crank speed (rad/s), ``v`` the slider's velocity
+    (m/s); ``load`` has the components of the force at P (N).
 
     Raises ValueError or ZeroDivisionError if the links cannot be joined at this position; InputError if the friction of
     the parameters depends on contact forces.
@@ -252,7 +253,8 @@ def inverse_dynamics(
     Raises
     ------
     InputError
-        If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
+        If the speed is zero or not finite, the load is not two finite numbers, there are too few samples for the series, or
+        the parameters have friction that depends on contact forces.
     AssemblyError
         If the links cannot be joined somewhere on the turn; the message gives the crank angle.
     """

@@ -116,6 +116,8 @@ def greatest_derivative(linkage: syn.Linkage, order: int) -> float:
 def motion_of_plant(linkage: syn.Linkage) -> FourierSeries:
     """Return the slider position (m) as a Fourier series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
 
+    For a fixed rocker pivot the series is 0.
+
     Raises
     ------
     InputError

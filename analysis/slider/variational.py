@@ -50,7 +50,8 @@ ROUNDING = 1e-12
 #: 2.4e-7.
 HALVINGS = 44
 GAP = 1e-5
-#: Costs of the squared travel, which decides between equal errors, and of a jump, which exceeds the sum of all errors (1).
+#: Costs of the squared travel, relative to l3 + l4, which decides between equal errors, and of a jump, which exceeds the sum
+#: of all squared errors: these are scaled so that their sum is at most 1.
 TRAVEL = 1e-12
 JUMP = 2.0
 
@@ -295,20 +296,21 @@ def variational_motion(
     weights : array_like, shape (n,), optional
         Weights of the squared errors; 1 by default. They affect the slider positions only if ``continuous`` is True.
     continuous : bool
-        False: choose the least error at each rotation and, among equal errors, the least travel. True: choose the motion with
-        the fewest jumps (none, if possible) and, among these motions, the least sum of squared errors.
+        False: choose the least error at each rotation and, among equal errors, the fewest jumps, then the least travel. True:
+        choose the motion with the fewest jumps (none, if possible) and, among these motions, the least sum of squared errors.
     closed : bool
         Whether the motion is periodic: one turn later, the first rotation follows the last.
 
     Raises
     ------
     InputError
-        If rotations, targets or weights have wrong shapes, are not finite or not increasing, or span more than a turn.
+        If rotations, targets or weights have wrong shapes or are not finite, if the rotations do not increase or, with
+        ``closed``, span more than a turn, or if a weight is negative.
     ParameterError
         If guide angle, stroke, least transmission angle or assemblies are invalid, or the coupler point of a path is on the
         crank pin, where the slider does not move it.
     AssemblyError
-        If there is a rotation at which the links cannot be joined at any slider position.
+        If there is a rotation at which the links cannot be joined at any slider position that the bounds allow.
     """
     phi = np.array(rotation, dtype=float)
     aim = np.array(target, dtype=float)

@@ -44,7 +44,10 @@ class ClosureError(LinkworkError):
 
 
 def scale(p: SliderCrankParameters, shift: Array) -> float:
-    """Return the length (m) by which lengths are divided to compare them with angles: link lengths plus largest ``|shift|``."""
+    """Return the length (m) by which lengths are divided to compare them with angles.
+
+    It is the sum of crank length, rod length, magnitude of the guide offset, and largest ``|shift|``.
+    """
     return p.crank_length + p.rod_length + abs(p.guide_offset) + float(np.max(np.abs(shift)))
 
 
@@ -73,7 +76,7 @@ class Loops:
         """Return the dual matrix of a frame fixed to the rod relative to frame 1, (n, 3, 3).
 
         The origin of the frame is the crank pin, and its axis i is along the rod. This frame is not frame 3, in which
-        components of forces are given (`JointLoads.components`): the axes j and k are turned about the rod by the spin angle,
+        components of forces are given (`ForceTurn.vector`): the axes j and k are turned about the rod by the spin angle,
         which depends on the start of the iteration.
         """
         return cast(Dual, _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball)

@@ -182,8 +182,8 @@ def rates(
 def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
     """Return the inertia binors of crank (in frame 2), rod (in its frame at the crank pin) and slider (in frame 4 at its pin).
 
-    Only the crank's inertia about its axis and the rod's inertia about transverse axes have an effect. The slider's inertia
-    has none, because the slider does not rotate.
+    The inertia matrices have only the elements that have an effect: the crank's moment of inertia about its axis and products
+    of inertia with this axis, and the rod's moment of inertia about transverse axes. The slider does not rotate.
     """
     crank = np.zeros((3, 3))
     crank[2] = crank[:, 2] = -p.crank_product_xz, -p.crank_product_yz, p.crank_inertia

@@ -359,7 +359,8 @@ def force_turn(
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2). Here and below, a number may be given as text with its unit, such as "50 rpm".
     shift : ShiftLaw
-        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another law. The parameters' own groove is not used.
+        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another law; by default the shift is 0. The groove in the
+        parameters is not used.
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional
@@ -373,8 +374,8 @@ def force_turn(
     Raises
     ------
     InputError
-        If the parameters are not those of a slider-crank, both ``load`` and ``torque`` are given, a value is not finite or has
-        the wrong shape, or ``shift`` is not a `ShiftLaw`.
+        If the parameters are not those of a slider-crank, the crank speed is missing, both ``load`` and ``torque`` are given, a
+        value is not finite or has the wrong shape, or ``shift`` is not a `ShiftLaw`.
     AssemblyError
         If the rod does not reach the guide at some angle; the message gives the ranges in which it does. If ``partial`` is
         true, only if the rod reaches the guide at no angle.

@@ -112,7 +112,8 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     Raises
     ------
     ParameterError
-        If alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that many turns.
+        If alpha is not a ratio of whole numbers with a denominator of at most 64. The law repeats after as many turns as the
+        denominator says.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
@@ -323,8 +324,8 @@ def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
     """Find the least margin of assembly over the turn; it is negative if the crank cannot turn fully.
 
-    The crank can turn fully if this margin is zero or greater. A simulation also stays off the limit of assembly, by
-    `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
+    The crank can turn fully if this margin is zero or greater. A simulation ends before the limit of assembly: it needs a
+    margin of 5e-7 rod lengths, which follows from `linkwork.limits.LIMIT_SINE`.
     """
     return _margin(min, law, parameters.constants())
 
@@ -429,7 +430,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 
     There is one range, from 0 to the span, if the crank turns fully; none if the mechanism cannot be assembled at all; at most
     two at a constant shift. At the ends of a range rod and guide are exactly perpendicular; a simulation stops earlier,
-    within `linkwork.limits.LIMIT_SINE` of such an end.
+    where the cosine of the angle between them falls below `linkwork.limits.LIMIT_SINE`.
     """
     p = parameters.constants()
     return tuple(_range(low, high, law, p) for low, high in _find_ranges(law, p))

@@ -94,6 +94,7 @@ class MonteCarlo:
         The nominal mechanism, at the n angles.
     tolerances : tuple of Tolerance
     samples, seed : int
+        Number of samples, and seed of the random numbers.
     spreads : mapping
         `Spread` of each quantity, by name.
     estimates : mapping

@@ -236,7 +236,7 @@ def instant(turn: ForceTurn, at: Any) -> Instant:
 def nominal_values(turn: ForceTurn) -> dict[str, float]:
     """Return the parameters by field name.
 
-    If a groove makes the axial shift S1 (`GrooveShift`), its amplitude and ratio are included.
+    If the axial shift follows a `GrooveShift`, its amplitude and ratio replace those of the parameters.
     """
     values = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     if isinstance(turn.law, GrooveShift):
@@ -364,8 +364,8 @@ class Estimate:
     deviation : masked array, shape (n,)
         Standard deviation to first order: the root of the sum of squares of derivative times standard deviation.
     worst : masked array, shape (n,)
-        Greatest deviation from the nominal value to first order: the magnitude of every error is its extent, and its sign is
-        the worse one.
+        Greatest deviation from the nominal value to first order: every error has the magnitude of its half width, and the worse
+        sign.
     shares : masked array, shape (m, n)
         Share of each tolerance in the variance to first order; masked if the variance is only a rounding error.
     second_mean, second_deviation : masked array, shape (n,)
@@ -374,8 +374,8 @@ class Estimate:
     second_shares : masked array, shape (m, n)
         As ``shares``, to second order; the joint effect of two errors is divided equally between them.
 
-    If the slider's force is sought, all arrays but ``nominal`` are masked at the angles at which errors within their extents
-    can lead to a dead centre: the quantity has a pole at the dead centre, and so neither mean nor variance.
+    If the slider's force is sought and the quantity depends on it, all arrays but ``nominal`` are masked at the angles at which
+    errors within their half widths can lead to a dead centre: there the quantity has a pole, and so neither mean nor variance.
     """
 
     nominal: MaskedArray
@@ -495,7 +495,10 @@ def _curvatures(
 
 
 def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
-    """Return a mask (n,): whether the slider force is unknown and errors at their extents make its lever arm zero."""
+    """Return a mask (n,): whether the slider force is unknown and errors within their half widths can make its lever arm zero.
+
+    The effect of the errors on the lever arm is taken to first order.
+    """
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)

@@ -36,7 +36,7 @@ _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 def _eta_operator(th: float) -> FloatArray:
-    """Return the differential operator of the rotation eta when theta is ``th``, eqs 2b and 3b."""
+    """Return the differential operator of the rotation eta when theta is ``th`` (rad), eqs 2b and 3b."""
     return np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
 
 

@@ -1,6 +1,7 @@
 """Figures 3.4 and 3.5: the five-bar slider of Table 3.1 at 420 rpm with three springs.
 
-Figures 3.2 and 3.3 are in `no_spring`, Figures 3.6 to 3.10 in `launches`, Figures 3.11 to 3.14 in `free_crank`.
+Figures 3.2 and 3.3 are in `no_spring`, Figures 3.6 to 3.10 in `launches`, Figures 3.11 to 3.14 in `free_crank`. The arguments
+``stiffness``, ``soft`` and ``stiff`` are stiffnesses of springs in dyn/cm.
 """
 
 from __future__ import annotations
@@ -285,7 +286,7 @@ def graph_distance(x: FloatArray, one: FloatArray, other: FloatArray) -> FloatAr
 
 
 def torque_result() -> StudyResult:
-    """Compute the torque over the steady turn with each spring, and the crank angles at which the spring affects the torque."""
+    """Compute the torque over the steady turn with each spring, and judge the statements on Fig 3.5."""
     turns = {k: _steady(k) for k in runs.STIFFNESSES}
     columns = {ANGLE: turns[1e6].angle_deg}
     columns |= {f"crank torque; {_k(k)} [N.m]": turn.torque for k, turn in turns.items()}

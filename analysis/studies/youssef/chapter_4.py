@@ -2,7 +2,8 @@
 
 The thesis balances two harmonics, eqs (4.30) to (4.35), of its equation (4.21). We do the same with the correct coefficients
 and, for comparison, with the thesis's own, as printed and as listed in its program, all in the form of appendix 2. Amplitudes
-are those of zeta = u/l4. The spring with the mass m4 + m5 alone has the natural frequency omega_k = 31.623 rad/s.
+are those of zeta = u/l4. The spring with the mass m4 + m5 alone has the natural frequency omega_k = 31.623 rad/s. An inertia
+ratio is I4, the rocker's moment of inertia about D divided by m4 l4^2; a damper is given by omega_c = mu/(m4 + m5) (1/s).
 """
 
 from __future__ import annotations
@@ -240,7 +241,10 @@ def compute_first() -> StudyResult:
 
 
 def ten_harmonics(inertia_ratio: float) -> FloatArray:
-    """Return the amplitudes of harmonics 0 to `MANY` of zeta (no unit), a row for each speed of `EVERY`, at `COMPARED_AT`."""
+    """Return the amplitudes of harmonics 0 to `MANY` of zeta (no unit) with the damper `COMPARED_AT`.
+
+    There is a row for each speed of `EVERY`.
+    """
     motions = (linear(speed, inertia_ratio, COMPARED_AT, harmonics=MANY) for speed in EVERY.tolist())
     return np.array([motion.series.amplitudes for motion in motions])
 

@@ -40,7 +40,10 @@ DAMPERS_WORDS = f"omega_c = {WEAK:g} and {STRONG:g} 1/s (Fig 4.6)"
 
 
 def short_crank(order: int, inertia_ratio: float, damper: float, most: int = 2) -> FloatArray:
-    """Return the amplitude of a harmonic of u/l4 at each of the `SPEEDS` with the harmonics up to ``most`` balanced."""
+    """Return the amplitude of the harmonic ``order`` of u/l4 at each of the `SPEEDS`, by a balance of ``most`` harmonics.
+
+    ``damper`` is omega_c (1/s).
+    """
     return harmonic(order, SPEEDS, inertia_ratio, damper, harmonics=most)
 
 

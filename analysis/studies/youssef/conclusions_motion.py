@@ -1,4 +1,7 @@
-"""Verdicts on the conclusions of section 9.1 about the equations, the motion at constant speed, and launches."""
+"""Verdicts on the conclusions of section 9.1 about the equations, the motion at constant speed, and launches.
+
+Torque (dyn.cm), stiffness (dyn/cm) and damping (dyn.s/cm) of a launch are those of `launches.launch`.
+"""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[FloatArray,
 def integrate_by_runge_kutta(
     step: float, first: bool = False, stages: tuple[tuple[float, float], ...] = CLASSICAL
 ) -> FloatArray:
-    """Integrate the motion by Runge-Kutta's method; return the state after each step.
+    """Integrate the motion by Runge-Kutta's method; return the states at the start and after each step.
 
     The equations are those of the second approach of section 3.1, or of the first if ``first``.
     """

@@ -1,4 +1,7 @@
-"""Figures 3.11 to 3.14: the crank in free motion; u is the slider position."""
+"""Figures 3.11 to 3.14: the crank in free motion; u is the slider position.
+
+An argument ``stiffness`` is the stiffness of the spring in dyn/cm.
+"""
 
 from __future__ import annotations
 
@@ -151,7 +154,7 @@ def half_natural_frequencies(stiffness: float) -> FloatArray:
 def second_halves(runs: Sequence[Trajectory], start: float) -> list[FloatArray]:
     """Return the mean speeds of the later turns of each run, relative to the mean speed of its first turn.
 
-    The later turns are the second half of the turns that all runs have.
+    The later turns are the second half of the turns that all runs have; the turns begin at the crank angle ``start`` (rad).
     """
     speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
@@ -161,7 +164,7 @@ def second_halves(runs: Sequence[Trajectory], start: float) -> list[FloatArray]:
 def damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
     """Judge whether a free crank loses mean speed only if it has a damper.
 
-    Each pair has a run without the damper and a run with it.
+    Each pair has a run without the damper and a run with it; turns begin at the crank angle ``start`` (rad).
     """
     cases = []
     for label, runs in pairs.items():

@@ -68,9 +68,9 @@ class Drift:
 
     @property
     def _ends(self) -> tuple[NDArray[np.int64], FloatArray]:
-        """Return the numbers of the turns after the transient, and the slider position (cm) at the end of each.
+        """Return numbers of turns from the end of the transient on, and the slider position (cm) after so many turns.
 
-        If no turn follows the transient, all turns are used, from number 0.
+        If no turn follows the transient, the numbers begin at 0.
         """
         last = self._last
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)

@@ -65,7 +65,7 @@ class PublishedProblem:
 
     @property
     def constraints(self) -> tuple[syn.Constraint, ...]:
-        """Return the constraints, as `synthesize` takes them; they are ours, except for the bounds."""
+        """Return the constraints, as `synthesize` takes them; they are ours: the thesis bounds only lengths."""
         if self.limits is not None:
             return self.limits
         if isinstance(self.task, syn.RockerFunction):
@@ -74,12 +74,12 @@ class PublishedProblem:
 
     @property
     def unit(self) -> str:
-        """Return the unit of the error."""
+        """Return the unit of the error, cm2 for a path and deg2 for a rocker function."""
         return "deg2" if isinstance(self.task, syn.RockerFunction) else "cm2"
 
     @property
     def per_si(self) -> float:
-        """Return how many times ``unit`` is contained in one m2 or rad2; the thesis divides an error by its greatest weight."""
+        """Return the number of ``unit`` in one m2 or rad2; for a rocker function divided by the greatest weight."""
         if not isinstance(self.task, syn.RockerFunction):
             return CM2_PER_M2
         return DEG2_PER_RAD2 / float(np.max(np.asarray(self.task.weights, dtype=float)))

@@ -1,4 +1,7 @@
-"""Rig 1: the motions near resonance, where the rig could not be run, and the effect of friction on the amplitudes."""
+"""Rig 1: the motions near resonance, where the rig could not be run, and the effect of friction on the amplitudes.
+
+Speeds are in rpm; a coefficient is that of the friction in the guide.
+"""
 
 from __future__ import annotations
 
@@ -209,7 +212,8 @@ def friction_force_ratios(speed: float, coefficient: float) -> FloatArray:
 def difference_from_constant(speed: float, coefficient: float) -> float:
     """Return the greatest difference of u with friction by a coefficient from u with constant friction, with spring A.
 
-    The constant friction is the mean over a turn without friction. The result is relative to the amplitude without friction.
+    The constant friction is the coefficient times the mean guide force over a turn without friction. The result is relative to
+    the amplitude without friction.
     """
     mean = coefficient * float(np.abs(turn("A", speed)["slider.guide_force"]).mean())
     varying, even = (

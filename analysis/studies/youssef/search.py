@@ -129,7 +129,7 @@ def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> Float
 
 
 def downhill(error_of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
-    """Minimise an error by the downhill simplex from given vertices until (6.15) holds.
+    """Minimise an error by the downhill simplex from given vertices until (6.15) holds, or give up after `MOST` evaluations.
 
     For (6.15) each parameter is tested by itself, as in the program (L9669). ``free`` are the indices of the parameters that
     the search may change, by default all.
@@ -236,7 +236,10 @@ def _second_search(first: Found, share: float, random: np.random.Generator) -> F
 
 
 def descend(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
-    """Return the parameters and the error (cm2) at the end of a least-squares descent, for closure ``side`` and n points."""
+    """Return the parameters and the error (cm2) at the end of a least-squares descent with n points.
+
+    ``side`` is the index of the closure (0 or 1) in `both_closures`.
+    """
     inside = np.clip(v, FREE_LOW + 1e-9, FREE_HIGH - 1e-9)
     end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(FREE_LOW, FREE_HIGH), xtol=1e-12, ftol=1e-12)
     return end.x, 2.0 * float(end.cost)
@@ -250,7 +253,10 @@ def minimum_error(found: Found) -> float:
 
 @cache
 def minima(n: int) -> FloatArray:
-    """Return the errors of the minima that descents from random sets reach with n points; minima within `APART` count once."""
+    """Return the errors (cm2) of the minima that descents from random sets reach with n points, each multiplied by N / n.
+
+    Minima whose errors differ by less than `APART` count once.
+    """
     random = np.random.default_rng(612)
     ends = [descend(v, side, n) for v in (draw_set(random) for _ in range(DESCENTS)) for side in (0, 1)]
     errors = np.sort([error * N / n for v, error in ends if closes(v)])

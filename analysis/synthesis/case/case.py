@@ -128,7 +128,7 @@ class Constraints:
     Attributes
     ----------
     least_transmission_angle : float
-        Least value; 0 only requires that the crank turns fully, false requires nothing.
+        Least transmission angle; 0 only requires that the crank turns fully, false requires nothing.
     over : "turn" or "task"
         Where the transmission angle is bounded: over a turn, or only during the task.
     full_turn : bool
@@ -201,7 +201,11 @@ class Constraints:
                 raise ParameterError(f"constraints.{name}", value, f"come with {' or '.join(carriers)}")
 
     def constraints(self) -> tuple[constraint.Constraint, ...]:
-        """Return the constraints; if the crank cannot turn fully, the transmission angle is bounded only over the task."""
+        """Return the constraints of the table.
+
+        If ``over`` is not given, the transmission angle is bounded over a turn or, if the crank of the required Grashof type
+        cannot turn fully, only over the task.
+        """
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
         pins = PINS if self.pins is None else self.pins

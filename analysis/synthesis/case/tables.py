@@ -173,7 +173,7 @@ class _ObjectiveAndRange:
     Attributes
     ----------
     n : int
-        Number of steps of a formula's parameter, 72 by default.
+        Number of values of a formula's parameter, at equal steps; 72 by default.
     start, end : float or str
         Range of the parameter t of a formula: an angle, or a formula such as "2*pi".
     unit, angle_unit : str

@@ -139,10 +139,11 @@ class GuidanceMap(NotebookResult):
         Samples of the centre-point and the circle-point curve (m); each index is a dyad. The points lie on lines through a pole
         of two poses: each line meets the circle-point curve in two further points.
     sound : ndarray of bool, shape (n, n)
-        Whether the linkage with the row's dyad as crank and the column's dyad as rocker is free of defects.
+        Whether the linkage with the row's dyad as crank and the column's dyad as rocker is free of defects and has no link
+        longer than `LONGEST`.
     transmission : ndarray, shape (n, n)
         Least deviation of the same linkage's transmission angle from 0 and pi between the first pose and the last (rad); 0 if
-        the linkage has a defect.
+        the linkage is not ``sound``.
     solutions : tuple of Solution
         The linkages with the largest ``transmission`` that differ clearly from one another.
     """
@@ -219,8 +220,8 @@ def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
 def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Compute the four dyads of five poses, including complex ones; all lengths are in units of the poses' size.
 
-    ``p`` are the positions of the body's reference point relative to the first one, as complex numbers; ``angle`` are the
-    body's angles (rad); both have the shape (5,). The results z and m, each of shape (4, 2), are the Cartesian coordinates of
+    ``p`` are the positions of the body's reference point as complex numbers; ``angle`` are the body's angles (rad); both have
+    the shape (5,). The results z and m, each of shape (4, 2), are the Cartesian coordinates of
     the point and the pivot of each dyad, relative to the first position. They are real for a dyad that can be built.
 
     Raises InputError if the conditions of the poses are not independent.

@@ -435,7 +435,7 @@ class QuickSwing(RockerFunction):
 
 
 def _advance(time_ratio: float) -> float:
-    """Return the `crank_advance` of a time ratio; raise ParameterError if the ratio is not a finite number of 1 or more."""
+    """Return the advance pi (Q - 1)/(Q + 1) (rad) for a time ratio Q; raise ParameterError if Q is not finite or below 1."""
     if not (isfinite(time_ratio) and time_ratio >= 1.0):
         raise ParameterError("time ratio", time_ratio, "be a finite number of 1 or more")
     return crank_advance(time_ratio)

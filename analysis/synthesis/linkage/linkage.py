@@ -376,7 +376,7 @@ class Linkage:
         """Return the type of the four-bar by Grashof's criterion, with the rocker pivot at the end of the ground link.
 
         One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
-        does not), triple-rocker, change-point.
+        does not), triple-rocker, change-point; "slider-crank" for a slider-crank.
         """
         if self.links != LINKS:
             return self.kind
@@ -457,7 +457,10 @@ class Linkage:
 
     @staticmethod
     def driven_speed(g: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        """Return the speed of the driven link divided by the speed of the crank; ``g`` is the position of the closed loop."""
+        """Return the speed of the rocker divided by that of the crank; ``g`` is the position of the closed loop.
+
+        For a slider-crank it is the speed of the slider divided by that of the crank pin.
+        """
         lengths: Any = SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)
         return kinematics.coefficients(g, lengths).k42
 

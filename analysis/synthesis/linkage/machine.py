@@ -113,7 +113,7 @@ class MachineSpec:
         Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
     slider_mass, slider_stiffness, slider_damping : float, optional
         Properties of the slider that carries D (kg, N/m, N.s/m); by default the properties of a block on a spring so stiff that
-        D hardly moves.
+        D hardly moves. A slider-crank's slider has by default the mass of this block, and neither spring nor damper.
     slider_coulomb_friction : float
         Coulomb friction of the slider (N).
     slider_spring_free_position : float

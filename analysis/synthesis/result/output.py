@@ -502,6 +502,7 @@ def _guide_and_block(
 def run_case(solution: Solution, make: MachineSpec, title: str) -> dict[str, Any]:
     """Return the tables of a case file that runs the linkage through its task at constant speed.
 
+    The run takes two turns or, if the crank does not turn fully, goes from the first target to the last.
     A slider-crank runs as the slider-crank mechanism, any other linkage as the five-bar slider; see `docs/case-files.md`.
     The five-bar's slider starts in its steady motion or, if the crank does not turn fully, in equilibrium.
     """
