@@ -78,7 +78,7 @@ def _unequal() -> printed.Bodies:
 
 
 def _binors(b: printed.Bodies) -> tuple[Binor, Binor, Binor]:
-    """Return the inertia binors of eqs 46 to 48 with g3 = `G3`, in lb.s2 and inches."""
+    """Return the inertia binors of eqs 46 to 48 with g3 = `G3`, in pounds, inches and seconds."""
     first, second, third = (
         Binor(mass=m, moment=m * np.array([g, 0.0, 0.0]), inertia=m * np.diag(squares))
         for m, g, squares in zip(

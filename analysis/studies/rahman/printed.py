@@ -258,7 +258,8 @@ def separated_rates(c: Crank, q: Joints) -> FloatArray:
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
     """Return the residual of eq 37f (in/s) with erratum 2 mended, with joint rates that satisfy eqs 37a to 37e.
 
-    With the erratum mended, the rate of eta acts about the axis j that the rotation by theta has turned.
+    ``angle`` (rad), ``shift`` (m) and ``speed`` (rad/s) are theta1, S1 and theta1'. With the erratum mended, the rate of eta
+    acts about the axis j that the rotation by theta has turned.
     """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)

@@ -89,7 +89,10 @@ def chapter_2_residuals() -> dict[str, float]:
 def chapter_2_terms(
     th2: float, links: tuple[float, float], w: float, v: float, m: dynamics.Motion, pins: dynamics.Reactions
 ) -> dict[str, tuple[float, ...]]:
-    """Return the terms of each equation (2.11) to (2.21) as in the scanned text; ``links`` are th3 and th4 + alpha (rad)."""
+    """Return the terms of each equation (2.11) to (2.21) as in the scanned text, by the equation's number.
+
+    ``links`` are th3 and th4 + alpha (rad), ``w`` is the crank speed (rad/s), ``v`` the slider velocity (m/s).
+    """
     q, p, (th3, th4), g, x, y = FULL, FULL.constants(), links, FULL.gravity, pins.cx, pins.cy
     alpha, alpha1, swing = q.slider_guide_angle, q.ground_inclination, th2 - th3 - q.coupler_cog_angle
     tilt2, tilt3, point = th2 + alpha1, th3 + q.coupler_cog_angle + alpha1, th3 + q.coupler_point_angle + alpha1

@@ -42,7 +42,7 @@ SAMPLES = 10_000
 
 
 class Quality(NamedTuple):
-    """Quality functions of a linkage: sum of squared distances of the timed path, and area between the curves (cm2)."""
+    """Quality functions of a linkage (cm2): sum of squared distances of the timed path, and area between the curves."""
 
     timed: float
     area: float
