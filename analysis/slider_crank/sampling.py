@@ -287,7 +287,8 @@ def monte_carlo(
     seed : int
         Seed of the random numbers: the same seed gives the same samples.
     n_jobs : int, optional
-        Number of threads, -1 for one per core; inside `joblib.parallel_config` all cores of the cluster are used.
+        Number of threads, -1 for one per core. The default is one thread; inside `joblib.parallel_config` for a cluster the
+        default is all cores of the cluster.
 
     Raises
     ------
