@@ -55,7 +55,7 @@ COMMANDS = (
 
 
 def by_fmpy(cases: list[Any]) -> list[float]:
-    """Run the cases by FMPy's `simulate_fmu`.
+    """Run the cases by FMPy's `simulate_fmu`; return the coordinate at the end of each case.
 
     With CVode it sets inputs only at the ends of CVode's own steps; the table of the command is therefore dense.
     """
@@ -94,7 +94,10 @@ def by_fmpy(cases: list[Any]) -> list[float]:
 
 
 def by_pathsim(cases: list[Any]) -> list[float]:
-    """Run the cases by PathSim's block for co-simulation or, if a solver is given, by its block for model exchange."""
+    """Run the cases by PathSim's block for co-simulation or, if a solver is given, by its block for model exchange.
+
+    Return the coordinate at the end of each case.
+    """
     from math import cos, sin
 
     import pathsim.solvers
@@ -148,7 +151,10 @@ def by_cosimulate(cases: list[Any]) -> list[float]:
 
 
 def by_steps(by: Callable[..., Any], cases: list[Any]) -> list[float]:
-    """Run the cases by a function of `tests.fmu.masters`, which calls a master step by step."""
+    """Run the cases by a function of `tests.fmu.masters`, which calls a master step by step.
+
+    Return the coordinate at the end of each case.
+    """
 
     def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
         _, speed, rate, coordinate, a, b = command

@@ -268,7 +268,7 @@ class PylinkageScore:
         if self.normal.rotation is not None:
             own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
             steps = own * -(-N // own)
-            self.least_error = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
+            self.stations = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
         self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
 
     def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
@@ -280,7 +280,7 @@ class PylinkageScore:
         track = linkage.track()
         if not np.isfinite(track).all():
             return inf
-        at = track[self.least_error] if self.normal.timed else track
+        at = track[self.stations] if self.normal.timed else track
         return self.errors(at, linkage.q[10]) + float(self.normal.weights.sum()) * self.contest.penalty(self.box, x)
 
     def penalised_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:

@@ -47,17 +47,17 @@ ASKED: Mapping[str, tuple[Constraint, ...]] = {"40 degrees": USUAL, "full turn":
 
 
 def eight(t: FloatArray) -> FloatArray:
-    """Return points of Gerono's figure-eight curve, twice as long as wide, shape (n, 2)."""
+    """Return points of Gerono's figure-eight curve, 1 m long and 0.5 m wide, at n parameters t (rad), shape (n, 2)."""
     return np.column_stack([0.5 * np.sin(t), 0.25 * np.sin(2.0 * t)])
 
 
 def lemniscate(t: FloatArray) -> FloatArray:
-    """Return points of Bernoulli's lemniscate, shape (n, 2)."""
+    """Return points of Bernoulli's lemniscate, 2 m long, at n parameters t (rad), shape (n, 2)."""
     return np.column_stack([np.cos(t), np.sin(t) * np.cos(t)]) / (1.0 + np.sin(t)[:, None] ** 2)
 
 
 def limacon(t: FloatArray) -> FloatArray:
-    """Return points of a limaçon with an inner loop, shape (n, 2)."""
+    """Return points of a limaçon with an inner loop (m), at n polar angles t (rad), shape (n, 2)."""
     return (0.5 + np.cos(t))[:, None] * np.column_stack([np.cos(t), np.sin(t)])
 
 

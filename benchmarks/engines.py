@@ -346,7 +346,10 @@ class _ExudynSolver:
         integration.newton.absoluteTolerance = 1e-14
 
     def run(self, start: float, end: float, steps: int, sampling: float) -> None:
-        """Integrate from the initial configuration in equal steps; the result becomes the current configuration."""
+        """Integrate from the initial configuration in equal steps; the result becomes the current configuration.
+
+        The run lasts from ``start`` to ``end``; the sensors store a value after each time ``sampling`` (all in s).
+        """
         integration = self.settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
         self.settings.solution.sensors.writePeriod = sampling

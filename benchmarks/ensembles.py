@@ -37,7 +37,7 @@ LENGTHS = {"three turns": 6.0 * pi / SPEED, "0.1 s": 0.1}
 
 @contextmanager
 def without_lanes() -> Iterator[None]:
-    """Solve all runs one after the other, without lanes, while the context lasts."""
+    """Solve all runs one after the other while the context lasts, not several at once in the lanes of vector instructions."""
     lanes_of_processor = vectors.LANES
     vectors.LANES = 1
     try:

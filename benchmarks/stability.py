@@ -42,7 +42,7 @@ STEP = 1e-6
 def scipy_orbit(
     parameters: FiveBarParameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the start of the periodic orbit and its largest Floquet multiplier, by shooting with SciPy."""
+    """Return the start of the periodic orbit and the modulus of its largest Floquet multiplier, by shooting with SciPy."""
     p = parameters.constants()
     speed = drive.speed
     assert speed is not None

@@ -7,7 +7,7 @@ Three tables, all in one run:
 1. the time of a coupler curve of 72 points and of its Jacobian in a compiled loop, compared with NumPy over arrays and with
    pylinkage's steps;
 2. for every problem of chapter VI, the error and the time of a call of `synthesize`, with its default settings, on two cores,
-   and with `FEW` candidates and starts (`benchmarks.race` compares it with other searches);
+   and with the fewer candidates and starts of `FEW` (`benchmarks.race` compares it with other searches);
 3. how many of 40 starts reach the optimum, with bounds alone, and the time of a start: with exact Jacobians (SciPy's least
    squares, IPOPT) and with the simplex.
 """

@@ -3,9 +3,9 @@
 The published targets are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the
 six points of a vertical line from the same literature. Youssef's targets and the vertical line keep the bounds and constraints
 with which they were published. All other targets have the defaults of `synthesize`: a least transmission angle of 40 degrees
-over a full turn, and no link longer than five sizes of the target. The drawn targets are the example's drawing and nine curves
-from the random seeds 1 to 9; the last two functions come from the seeds 1 and 2. No target was removed or changed because of a
-result.
+over a full turn, and no link longer than five sizes of the target; for the example's drawing no link is longer than 0.3 m. The
+drawn targets are this drawing and nine curves from the random seeds 1 to 9; the last two functions come from the seeds 1 and 2.
+No target was removed or changed because of a result.
 """
 
 from collections.abc import Mapping, Sequence

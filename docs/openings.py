@@ -89,7 +89,7 @@ def links(page: str, text: str) -> str:
 def _answer(path: Path, folder: Path) -> dict[str, Any]:
     """Solve a task; return its first result that the FMUs can represent, as a state of the studio.
 
-    The slider of a slider motion is released in that state.
+    If the task is a slider motion, no force moves the slider in that state.
     """
     text = path.read_text(encoding="utf-8")
     command = "tune" if "[tune]" in text else "slider-motion" if "[tracking]" in text else "synthesize"

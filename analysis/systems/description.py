@@ -33,7 +33,7 @@ PARTNERS = ("induction-motor", "flywheel-gear", "line-shaft", "press-load")
 
 
 def _flat_table(value: Any, name: str) -> dict[str, Any]:
-    """Return a table whose names with dots may be tables within tables."""
+    """Return the table ``value`` with nested tables replaced by entries with dotted names; ``name`` is for messages."""
     return files.flatten(files.as_table(value, name))
 
 
@@ -52,8 +52,8 @@ class PartTable:
     fmu : str
         An FMU of FMI 2.0 or 3.0, from any tool.
     values : mapping
-        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list with the name ``table``
-        sets ``table_0``, ``table_1`` and so on.
+        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI; for an FMU only numbers, in the
+        units of its variables. A list with the name ``table`` sets ``table_0``, ``table_1`` and so on, but not for an FMU.
     """
 
     case: str = entry(files.text, "")
@@ -223,7 +223,7 @@ class System:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
-    """A part: its mechanism, controller or FMU, and its start values (SI)."""
+    """A part: its mechanism, controller or FMU, and its start values (SI; for an FMU, in the units of its variables)."""
 
     name: str
     values: Mapping[str, float]

@@ -29,7 +29,8 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     Raises
     ------
     WiringError
-        If a part is neither a native FMU with its sources nor a controller known to the host.
+        If a part is neither a native FMU with its sources nor a controller known to the host, or two different FMUs have the
+        same model identifier.
     """
     folder = Path(folder)
     files = {name: (resources.files(__package__) / name).read_text(encoding="utf-8") for name in (_HOST, _CONTROLLERS)}

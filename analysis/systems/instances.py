@@ -39,7 +39,7 @@ class Instance:
     the part can save and restore its state.
     """
 
-    #: FMPy's class; the types of real variables and, in the functions that set them, of enumerations
+    #: FMPy's class; last words of its methods that get and set real variables, and of its method that sets enumerations
     _running: type = FMU2Slave
     _reals, _enumerations = "Real", "Integer"
 

@@ -125,7 +125,8 @@ def run_many(
     folder : path, optional
         Folder in which the runs are kept; runs that are finished in this folder are not repeated.
     n_jobs : int, optional
-        Number of processes; by default that of `run_in_parallel`, also within `joblib.parallel_config`.
+        Number of processes, -1 for one per core. The default is one process; inside `joblib.parallel_config` for a cluster the
+        default is all cores of the cluster.
     progress : bool
 
     Raises
@@ -214,7 +215,7 @@ class _Storage:
                 self.messages[number] = message
 
     def add(self, numbers: Sequence[int], found: list[tuple[NDArray[np.float64], str]]) -> None:
-        """Store a batch: first its samples, then messages and lengths, which mark runs as finished."""
+        """Store the runs ``numbers`` of a batch: first samples, then messages and lengths, which mark runs as finished."""
         for number, (samples, _) in zip(numbers, found):
             self.samples[number, :, : samples.shape[1]] = samples
         said = [(number, message, samples.shape[1]) for number, (samples, message) in zip(numbers, found) if message]

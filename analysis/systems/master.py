@@ -131,7 +131,8 @@ class _Instances:
             self.ends = [End(name, output) for name, each in self.instances.items() for output in each.outputs]
             index = {end: number for number, end in enumerate(self.ends)}
             self.targets = targets = {target: number for number, target in enumerate(wiring.connections)}
-            #: For each connected input the number of its output; for each part the names and numbers of its connected inputs.
+            #: For each connected input the index of the output to which it is connected; for each part the names and indices of
+            #: its connected inputs.
             self.sources = np.array([index[source] for source in wiring.connections.values()], dtype=int)
             self.own = {
                 name: ([target.port for target in self.targets if target.part == name],
@@ -175,7 +176,7 @@ class _Instances:
         self.partner = np.array(
             [self.targets.get(wiring.rate_input(end) or end, n) for end, n in self.targets.items()], dtype=int
         )
-        #: For each power bond the numbers of the outputs effort and flow, and of the inputs to which they are connected.
+        #: For each power bond the indices of the outputs effort and flow, and of the inputs to which they are connected.
         numbers = [(index[b.effort], index[b.flow], targets[b.effort_to], targets[b.flow_to]) for b in bonds]
         self.bonds = np.array(numbers, dtype=int).reshape(-1, 4).T
         self.outputs = self.before = self._read()
@@ -276,7 +277,7 @@ class _Instances:
 
 
 def count_steps(stop_time: float, step: float) -> int:
-    """Return the number of equal steps in a run, of which the last may be shorter; raise InputError if the step is invalid."""
+    """Return the number of steps in a run, all equal or with a shorter last one; raise InputError if the step is invalid."""
     if not 0.0 < step <= stop_time < inf:
         raise InputError(
             f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s, which must be "

@@ -35,7 +35,10 @@ Base = tuple[float, ...]
 
 
 class Given(NamedTuple):
-    """A start value as text, with its unit, the unit's definition in base units, and a transformation after its conversion."""
+    """A start value as text, with its unit and the unit's definition in base units.
+
+    ``converted`` tells whether the value is converted to the unit of its variable; ``change`` is a transformation after that.
+    """
 
     text: str
     unit: str = ""

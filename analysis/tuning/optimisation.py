@@ -214,7 +214,7 @@ class _Search:
         return sum(reading.excess for reading in readings(found, several).values())
 
     def keep(self, found: Survey, several: tuple[float, ...]) -> None:
-        """Remember a survey if it is the best so far."""
+        """Store a survey, with the levels that have two stable motions, if it is the best so far."""
         excess = self.excess(found, several)
         rank = excess > 0.0, excess, float(objective(self.wish, found.x))
         if self.best is None or rank < self.best[0]:
@@ -384,7 +384,10 @@ def _make_result(search: _Search, before: Survey, after: Survey, several: tuple[
 
 
 def _end(region: Region, side: int) -> SpecialPoint | None:
-    """Return the special point at the upper end of a region (side -1, to go below the range) or at its lower end."""
+    """Return the special point at the upper end of a region (side -1, to go below the range) or at its lower end (side +1).
+
+    The result is None if the branch was not followed to that end.
+    """
     ends = [s for s in (region.first, region.last) if s is not None]
     return next((s for s in ends if s.parameter == (region.high if side == _BELOW else region.low)), None)
 

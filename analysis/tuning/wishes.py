@@ -62,8 +62,8 @@ class Limit:
     output : str
         An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C`` or ``A`` of a user's own linkage,
         for the magnitude of the force in it; or ``amplitude of`` an output, for half its range.
-    below : float
-        The bound (SI).
+    below : float or str
+        The bound: a number in SI, or a text with a unit, which `Wish` converts to SI.
     unit : str
         Unit of the bound; `Wish` fills in unit and parts.
     parts : tuple of str
@@ -300,7 +300,7 @@ class Wish:
         return (values - self.present) / self.tolerance
 
     def operation(self, x: FloatArray, level: float) -> periodic.Operation:
-        """Return mechanism and drive with changes x in units of the tolerances, at a level of the range."""
+        """Return parameters and drive with changes x in units of the tolerances, at a level of the range."""
         assert self.drive is not None
         values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
         return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})

@@ -379,7 +379,7 @@ def nonlinear_harmonic_balance(
     start : FourierSeries, optional
         Initial slider position (m); by default the solution of the linear equation, reduced until the links can follow it.
     tolerance : float
-        Length of the last Newton step, relative to the rocker's length, at which the iteration ends.
+        Greatest change of a coefficient in the last Newton step, relative to the rocker's length, at which the iteration ends.
     load : Load
 
     Raises

@@ -42,7 +42,7 @@ from .solution import (
 )
 
 FloatArray = NDArray[np.float64]
-#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
+#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or less for small links (see `length_step`), and 0.1 degrees.
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
 #: Names of the dimensions of a moving pivot that are angles.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
@@ -130,8 +130,9 @@ def _residuals(
 def displacements(solution: Solution) -> dict[str, float]:
     """Compute how far each dimension, by name, moves the output: the rms displacement of the traced point per unit (m or rad).
 
-    For a rocker function the result is the change of its angle (rad). For an untimed path, whose crank rotations adapt to the
-    dimension, the displacement is across the curve.
+    For a rocker function the result is the change of its angle (rad). For a motion the rotation of the body, times
+    `Motion.length`, is included. For an untimed path, whose crank rotations adapt to the dimension, the displacement is across
+    the curve.
     """
     task, linkage = solution.task, solution.linkage
     normal = tasks.normal_form(task)
@@ -540,9 +541,9 @@ def _limit_lines(solution: Solution) -> str:
 
 
 def _rotation_line(what: str, places: Sequence[float], direction: float) -> str:
-    """Return a line with the title ``what`` and crank rotations in degrees; empty if ``places`` is empty.
+    """Return a line with the title ``what`` and the crank rotations ``places`` (rad) in degrees; empty if there are none.
 
-    The rotations are within a turn in the direction of the crank: negative if it turns clockwise.
+    They are written within a turn in the crank's ``direction`` (+1 or -1): as negative numbers if it turns clockwise.
     """
     if not places:
         return ""

@@ -508,8 +508,8 @@ def nearest_rotations(
 def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
     """Rank solutions: sound solutions first, then by the task's objective.
 
-    Solutions that are exact to rounding are ranked by their transmission angles during the task: the farthest from a dead
-    centre comes first.
+    Solutions that are exact to rounding are ranked by their transmission angles during the task: the one whose coupler and
+    rocker stay farthest from collinear comes first.
     """
 
     def place(solution: Solution) -> tuple[bool, float, float]:

@@ -42,7 +42,7 @@ PIECES = 360
 #: To minimise the greatest distance, first every STRIDE-th distance is bounded, then all distances of at least GREAT times the
 #: greatest distance.
 STRIDE, GREAT = 3, 0.5
-#: Greatest rotation of the first station from its former place, and least rotation between successive stations (rad).
+#: Greatest change of the first station's crank rotation, and least rotation between successive stations (rad).
 WINDOW, APART = 0.6, 1e-10
 #: Fraction by which the bound of the greatest distance may be exceeded: the points of the curve with the greatest distance
 #: change from step to step.
@@ -54,7 +54,9 @@ PHASE = UNKNOWNS.index("crank_phase")
 def residuals(
     normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
+    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations (rad), in normal form.
+
+    ``q``, shape (11,), has the values of `UNKNOWNS`; ``branch`` is the assembly, +1 or -1.
 
     Returns
     -------
@@ -161,7 +163,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
 
 
 class Distances(NamedTuple):
-    """Distances between points of curve and target (units), shape (k,), with their derivatives.
+    """Distances between points of curve and target (units of the target's size), shape (k,), with their derivatives.
 
     Each distance depends on two points of the curve with the indices ``before`` and ``after``; ``early`` and ``late``, shape
     (2, k), are its derivatives with respect to the coordinates of these points.
@@ -177,14 +179,14 @@ class Distances(NamedTuple):
 class Refinement:
     """Minimisation of the measure (area or greatest distance) between a curve and its target path.
 
-    ``program`` has the objective "curve" or "least curve"; see `Statement`.
+    ``program`` has the objective "curve" or "least curve"; see `Statement`. Lengths are in units of the target's size.
     """
 
     def __init__(self, program: Program) -> None:
         self.program, normal = program, program.normal
         self.normal = normal
         assert normal.outline is not None
-        #: Bound of the greatest distance from the target (m) if another function is minimised; else None.
+        #: Bound of the greatest distance from the target (units) if another function is minimised; else None.
         self.limit = program.least.error if program.objective == "least curve" else None
         self._target = TargetPath(points=_coordinates(normal.outline).T, closed=normal.closed)
         self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)
@@ -347,7 +349,8 @@ class Refinement:
     def _scaled_directions(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
         """Return scaled directions in the space of the k unknowns, shape (k, number of unknowns that are not fixed).
 
-        A step of 1 along a direction moves the curve perpendicular to itself by 1, in the root mean square.
+        A step of 1 along a direction moves the curve perpendicular to itself by 1, in the root mean square. ``slopes`` are the
+        derivatives that `trace` returns.
         """
         tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
         normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)

@@ -66,7 +66,7 @@ PIECES = 3
 MOST = 32
 #: Linkages that differ by less than this, relative to the longest link and in rad, count as the same.
 DIFFERENT = 1e-3
-#: Such a limit for linkages whose paths are being refined: linkages that differ by less end at the same optimum.
+#: The same limit for the laps of `RACE`: refined linkages that differ by less end at the same optimum.
 RACED = 0.02
 #: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14

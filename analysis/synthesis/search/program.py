@@ -71,8 +71,9 @@ class Start:
 class Answer:
     """Result of an optimisation: the linkage that it reached, as a `Start`, and whether it meets every constraint.
 
-    ``worst`` is the name of the constraint that is violated most. ``violation`` is the amount of this violation (units, rad, or
-    a fraction of the bound), and ``excess`` is the amount as text with its unit. ``status`` is the solver's message.
+    ``worst`` is the name of the constraint that is violated most. ``violation`` is the amount of this violation (multiples of
+    `Normal.unit`, rad, or a fraction of the bound), and ``excess`` is the amount as text with its unit. ``status`` is the
+    solver's message.
     """
 
     start: Start
@@ -104,7 +105,7 @@ def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArr
 
 
 def distances_from_bounds(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
-    """Return by how much each unknown of a start lies outside its bounds (units, rad), shape (11,).
+    """Return by how much each unknown of a start lies outside its bounds (multiples of `Normal.unit`, rad), shape (11,).
 
     The value is 0 for an unknown that does not affect the task.
     """
@@ -191,10 +192,11 @@ def convert_to_start(given: Linkage | Solution, normal: Normal, pivot: PivotUnkn
 
 
 def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
-    """Draw random unknowns of a moving pivot, within the bounds of its stroke or length.
+    """Draw random unknowns of a moving pivot, within the bounds of the guide angle or of the second crank's length.
 
     ``unit`` is the size of the target (m), ``ground`` the ground link as a multiple of it. The coefficients of the harmonics
-    decrease with their order.
+    decrease with their order. For a slider their size is a tenth of the ground link, or a quarter of the greatest stroke if
+    this is less.
     """
     orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
     waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)

@@ -46,7 +46,8 @@ PINNED = 64
 PLACED = 160
 #: Number of crank steps of a coupler curve, and number of its points at equal arc lengths.
 CURVE, EVEN = 128, 64
-#: Pieces of a coupler curve for an open target: number of points at equal arc lengths, first steps, numbers of steps.
+#: Pieces of a coupler curve that are compared with an open target: number of points at equal arc lengths on each piece; crank
+#: steps at which pieces begin; numbers of crank steps in a piece.
 PIECE = 24
 STARTS = np.arange(0, CURVE, 8)
 SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])

@@ -75,8 +75,8 @@ class Synthesis(NotebookResult):
     ----------
     task : Task
     solutions : tuple of Solution
-        Solutions without defects come first, then in order of error. A solution also represents its mirror images and near
-        copies, which are its ``variants``.
+        Solutions without defects come first, and among these the one with the least value of what is minimised. A solution also
+        represents its mirror images and near copies, which are its ``variants``.
     method : str
         How the solutions were found: "scan" or "closed form".
     seed : int

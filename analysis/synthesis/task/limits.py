@@ -174,9 +174,9 @@ class Limits:
         return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
 
     def admits(self, linkage: Linkage) -> bool:
-        """Return whether a linkage has the kind and gear ratio of these limits.
+        """Return whether a search within these limits can start from a linkage, by its kind and gear ratio.
 
-        A linkage with a pivot on a guide counts as a four-bar.
+        A search for four-bars can also start from a linkage whose pivot moves on a guide or is carried by a second crank.
         """
         if self.linkage is FiveBar:
             return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio

@@ -244,7 +244,7 @@ class RockerFunction:
     Attributes
     ----------
     angle : ndarray, shape (n,)
-        th4 from the ground link (rad).
+        Angles of the rocker from the ground link, th4 (rad).
     rotation, weights : ndarray, shape (n,)
         As in `TimedPath`; the weights multiply the squared angular errors.
     mounting : bool
