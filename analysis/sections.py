@@ -86,7 +86,15 @@ class _Profile(_Section):
 
 @dataclass(frozen=True, slots=True)
 class Rod(_Profile):
-    """A round rod of given diameter (m) and density (kg/m3), or name of a material: moment of inertia m (3 r^2 + L^2)/12."""
+    """A round rod with mass m, radius r and length L: moment of inertia m (3 r^2 + L^2)/12.
+
+    Attributes
+    ----------
+    diameter : float
+        Diameter (m).
+    density : float
+        Density (kg/m3), or the name of a material.
+    """
 
     diameter: Amount
     density: Amount
@@ -100,7 +108,7 @@ class Rod(_Profile):
 
 @dataclass(frozen=True, slots=True)
 class Tube(_Profile):
-    """A round tube: moment of inertia m (3 (ro^2 + ri^2) + L^2)/12.
+    """A round tube with mass m, radii ro and ri and length L: moment of inertia m (3 (ro^2 + ri^2) + L^2)/12.
 
     Attributes
     ----------
@@ -128,7 +136,7 @@ class Tube(_Profile):
 
 @dataclass(frozen=True, slots=True)
 class Bar(_Profile):
-    """A rectangular bar: moment of inertia m (L^2 + w^2)/12 about an axis normal to the plane of motion.
+    """A bar with mass m, length L and width w: moment of inertia m (L^2 + w^2)/12 about an axis normal to the plane of motion.
 
     Attributes
     ----------

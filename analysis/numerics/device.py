@@ -97,7 +97,7 @@ def _make_array(context: Any, builder: Any, kind: Any, address: Any, shape: Sequ
 
 
 def pack(kind: Any, value: Any, place: Callable[[NDArray[Any]], int]) -> list[int]:
-    """Return the table from which the function of `reader` reads ``value``; ``place`` returns the address of an array."""
+    """Return the table from which the function that `reader` returns reads ``value``; ``place`` gives an array's address."""
     if isinstance(kind, types.BaseTuple):
         return [word for k, v in zip(kind.types, value, strict=True) for word in pack(k, v, place)]
     if isinstance(kind, types.Array):
@@ -212,7 +212,7 @@ def _write_elementary_functions(module: ir.Module) -> None:
 
 
 def _write_entry(module: ir.Module, kernel: str) -> None:
-    """Write the function that calls the kernel with the number of the thread and the table as an array of Numba."""
+    """Write the function `ENTRY`, which calls the kernel with the thread's number and the table, passed as Numba's array."""
     pointer, status = ir.IntType(8).as_pointer(), ir.IntType(32)
     cuda = module.triple == _TRIPLE
     array = [pointer, pointer, _LONG, _LONG, _TABLE, _LONG, _LONG]

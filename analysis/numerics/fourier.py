@@ -47,9 +47,10 @@ class FourierSeries:
 
     @classmethod
     def from_samples(cls, samples: ArrayLike, order: int | None = None) -> FourierSeries:
-        """Compute the series through n samples at equal steps over one period, the first at x = 0.
+        """Compute the series from n samples at equal steps over one period, the first at x = 0.
 
-        The default of ``order`` is the highest that the samples determine, (n - 1) // 2.
+        The default of ``order`` is the highest that the samples determine, (n - 1) // 2; the series then passes through the
+        samples if n is odd. In all other cases its mean square difference from the samples is the least of this order.
 
         Raises
         ------
@@ -121,7 +122,10 @@ class FourierSeries:
 
 
 def trigonometric(values: NDArray[np.float64], period: float) -> Callable[[float], NDArray[np.float64]]:
-    """Return the trigonometric polynomial f(t) through values, shape (n, ...), at n equal steps of a period from t = 0."""
+    """Return the trigonometric polynomial f(t) of order (n - 1) // 2 nearest to values at n equal steps of a period.
+
+    ``values``, shape (n, ...), begin at t = 0. If n is odd, the polynomial passes through them.
+    """
     n = len(values)
     order = (n - 1) // 2
     c = np.fft.rfft(values, axis=0)[: order + 1] / n

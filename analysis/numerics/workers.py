@@ -99,7 +99,7 @@ def worker_count(n_jobs: int | None) -> int:
 
 
 def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
-    """Return whether `run_in_parallel` works in this process and its threads."""
+    """Return whether `run_in_parallel` does the work in this process and its threads, not in other processes."""
     return not _workers(n_jobs, threads)[1]
 
 
@@ -128,7 +128,7 @@ def run_in_parallel(
 ) -> Iterator[tuple[int, Made]]:
     """Apply a function to items in parallel; yield index and result of each item as soon as it is done.
 
-    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` is true, or the workers of the backend that
+    The workers are processes of this machine, or threads of this process if ``threads`` is true; or those of the backend that
     `joblib.parallel_config` has set, such as "dask", "loky" or "threading". With one worker the work is done in this process.
     An item whose worker was killed goes to another worker. Worker processes of this machine end when this process ends.
 
@@ -139,6 +139,10 @@ def run_in_parallel(
     items : sequence
     interrupts : Interrupts, optional
         From `record_interrupts`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.
+    n_jobs : int, optional
+        Number of workers, -1 for one per core; by default the number that `joblib.parallel_config` has set, else 1.
+    threads : bool
+        Whether threads are preferred to processes.
 
     Raises
     ------

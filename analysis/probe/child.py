@@ -77,9 +77,8 @@ def _no_core_dump() -> None:
 def _fork_for_jobs() -> str:
     """Fork a process for each path of a job on standard input; return the path in the new process.
 
-    Standard output gets the number of each process, then its exit code, negative for a signal. This process ends
-    when its standard input is closed, not at Ctrl-C; the process that reads its output must end the jobs' processes and wait
-    for the codes.
+    Standard output gets the id of each process, then its exit code, negative for a signal. This process ends when its standard
+    input is closed, not at Ctrl-C; the process that reads its output must end the jobs' processes and wait for the codes.
     """
     interrupted = signal.signal(signal.SIGINT, signal.SIG_IGN)
     from . import checks as _checks  # noqa: F401  what every job needs is loaded once

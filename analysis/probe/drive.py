@@ -101,7 +101,7 @@ class Run:
         return array
 
     def step(self, size: float, inputs: Inputs | None = None) -> None:
-        """Set the inputs and make one step of the given size (s)."""
+        """Set the inputs and make one step of the given size (s), or a shorter one to the next time event (model exchange)."""
         if self.model.interface == "cs":
             self.set(inputs or {})
             self._do_step(size)
@@ -172,7 +172,10 @@ def step_size(model: Any) -> float:
 
 
 def first_difference(one: Values, other: Values, model: Any) -> str:
-    """Return the first variable that differs between two sets of values: its name and both values; empty if all are equal."""
+    """Return the first variable that differs between two sets of values: its name and both values; empty if all are equal.
+
+    If strings or continuous states differ, return only the name of the group, String or states.
+    """
     for group, data in one.items():
         if data == other[group]:
             continue

@@ -42,7 +42,11 @@ def references(variables: Sequence[Variable]) -> Any:
 
 
 def value(rng: random.Random, variable: Variable) -> Any:
-    """Return a random value that a variable should accept: its start value, or a value within its bounds."""
+    """Return a random value that a variable should accept: its start value, or another value.
+
+    Another value of a real variable is near its start and within its bounds. Of the others only inputs get other values, and
+    strings that are not parameters.
+    """
     if variable.group == "String":
         return (
             variable.start

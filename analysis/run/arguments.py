@@ -31,6 +31,8 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
     ------
     UnknownNameError
         If there is no set of that name.
+    InputError
+        If the name is that of a case file.
     """
     if isinstance(known, PublishedSet):
         return known

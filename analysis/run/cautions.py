@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism
 
 #: Least number of steps at which a run is checked for stiffness: a usual run takes about 50 steps per revolution.
 MANY_STEPS = 50_000
-#: Number of steps after which a stiff run ends if it would need more than this fraction of the largest number of steps.
+#: A stiff run ends after the first number of steps if it would need more steps than the largest number times the second.
 _PATIENCE, _SHARE = 1_000_000, 0.1
 #: Least decay rate times step size at which stability limits the step: explicit methods of this order are stable up to about 5.
 _STABLE = 2.0

@@ -320,9 +320,11 @@ class Comparison:
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:
     """Compare two runs output by output.
 
-    Differences are relative to the scale of an output: its largest magnitude in ``a``, but at least a thousandth of the
-    largest magnitude of outputs of the same kind. Small outputs (a force at one pin, the displacement of a stiff slider) may
-    therefore have fewer equal digits. The scale of a residual is the size of its terms.
+    Differences are relative to the scale of an output: its largest magnitude in ``a``, but at least 1 rad for an angle, and
+    for other outputs a thousandth of the magnitude usual for their unit. For lengths, forces and energies this is the largest
+    in the run; for velocities, accelerations and torques it is a product of the largest length, the crank speed and the
+    largest force. Small outputs (a force at one pin, the displacement of a stiff slider) may therefore have fewer equal
+    digits. The scale of a residual is at least the size of its terms.
 
     If both runs ended early with the same status after the same sample, only the samples that both have are compared: a run in
     process also has its last configuration, whereas a run of an FMU ends at the last communication point.

@@ -26,7 +26,7 @@ from .trajectory import Occurrence, Trajectory
 #: never stop.
 MOST_LOSSES = 300
 
-#: What can end an interval early: an event of the user, the number of a torsion bar that is released, or None for the limit
+#: What can end an interval early: an event of the user, the index of a torsion bar that is released, or None for the limit
 #: of assembly.
 What = Event | int | None
 
@@ -91,8 +91,8 @@ class March:
         self.occurrences: list[Occurrence] = []
         self.evaluations = 0
         self.status = k.RUNNING
-        #: number of an input that was not finite inside a step (the step is then repeated with a shorter length), and number of
-        #: evaluations without a value
+        #: index of the channel that was not finite inside a step (the step is then repeated with a shorter length), and how
+        #: many evaluations had no value
         self._lost: int | None = None
         self.losses = 0
         #: times in the present interval count as equal if they differ by less than this (s)

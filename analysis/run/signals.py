@@ -108,8 +108,8 @@ class Harmonics:
 class TorsionBar:
     """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then zero.
 
-    A torsion bar starts the mechanism of the thesis (section 3.2.2): torque T0 in N.m, released at 1 rad. The time of the
-    release is located exactly.
+    ``torque`` (N.m) is the torque at the angle 0; ``release_angle`` is in rad. Such a bar, released at 1 rad, starts the
+    mechanism of the thesis (section 3.2.2). The time of the release is located exactly.
     """
 
     torque: Amount
@@ -163,7 +163,10 @@ MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
 
 
 def kloss(motor: Any, speed: Any) -> Any:
-    """Return the torque of an induction motor at a crank speed (rad/s), which may be a symbol; ``motor`` is as in `MOTOR`."""
+    """Return the torque (N.m) of an induction motor at a crank speed (rad/s), which may be a symbol.
+
+    ``motor`` has the three numbers that `MOTOR` names.
+    """
     slip = 1.0 - speed / motor[2]
     return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
 

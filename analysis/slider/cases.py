@@ -107,7 +107,7 @@ class TrackingTable:
     coulomb_friction : float, optional
         Coulomb friction of the plant (N); by default the same as in the model.
     mass_error : float
-        Fraction by which the plant's masses and moments of inertia are larger than the model's.
+        Fraction by which the plant's masses and moments of inertia, except the crank's, are larger than the model's.
     load_known : bool
         Whether the feed-forward knows the load.
     """
@@ -132,7 +132,7 @@ class TrackingTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """The table ``[load]``: components of the force at P (N), along the ground link and perpendicular to it, to the left."""
+    """The table ``[load]``: force at P (N), ``fx`` along the ground link and ``fy`` perpendicular to it, to the left."""
 
     fx: float = files.entry(files.Quantity("N"), 0.0)
     fy: float = files.entry(files.Quantity("N"), 0.0)

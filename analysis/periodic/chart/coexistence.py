@@ -158,8 +158,7 @@ def coexistence(
     x, y : array_like, shapes (nx,) and (ny,)
         See `grid`.
     start : array_like, shape (n,), optional
-        A further guess. If the crank is driven by a torque, this guess is required, because it gives the crank speed; unless
-        the speed follows from a motor.
+        A further guess; under a torque it is required, as it gives the crank speed, unless the speed follows from a motor.
     folder, n_jobs, progress, what
         See `grid`.
 
@@ -400,7 +399,7 @@ def basins(
         If the drive is not a `Drive`, there is no stable motion or no such coordinate, a range does not increase, or ``n_jobs``
         is not usable.
     ParameterError
-        If a range is not two quantities, or ``points`` is not a whole number.
+        If a range is not two quantities, or ``turns`` or ``points`` is not a whole number.
     GridInterrupted
         On Ctrl-C; the same call, made again, continues from the rows that were finished.
 

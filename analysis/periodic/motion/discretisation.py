@@ -46,8 +46,8 @@ INTEGRATOR_TOLERANCE = 1e-12
 GROWTH, AIM, PLACES = 1e3, 10.0, 64
 #: Least number of pieces in a turn.
 _FEWEST = 8
-#: Collocation: calls that use shooting after collocation has failed; elements in a turn at first; greatest number of elements
-#: for each piece, in addition to eight times the first number; calls after which the elements are chosen again.
+#: Collocation: calls that use shooting after collocation has failed; elements in a common period at first; greatest number of
+#: elements for each piece, to which eight times the number at first is added; calls after which the elements are chosen again.
 _PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 8, 8, 64
 
 
@@ -281,8 +281,8 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 class Discretisation:
     """Method that computes y at the ends of the pieces of a period, for one motion of a family after another.
 
-    Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried, as
-    ``collocated`` tells (`can_collocate`). For ``angles`` see `Stations`.
+    Collocation, which takes the previous motion as first approximation, is tried if ``collocated`` is true: see
+    `can_collocate`. Shooting is used where collocation is not tried or fails. For ``angles`` see `Stations`.
     """
 
     def __init__(self, angles: FloatArray, collocated: bool) -> None:

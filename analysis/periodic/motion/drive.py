@@ -73,8 +73,8 @@ class Drive:
     speed : float or None
         Prescribed crank speed (rad/s), above zero; None for a drive by torque.
     torque : float
-        Constant torque on the crank (N.m), which is the mean torque without the torque of a motor. Give 0 if a force law of the
-        mechanism drives the crank. At a prescribed speed the torque is 0.
+        Constant torque on the crank (N.m), to which the torque of ``motor`` is added. Give 0 if a force law of the mechanism
+        drives the crank. At a prescribed speed the torque is 0.
     motor : InductionMotor or None
         Motor on the crank; its torque is added to ``torque``.
     forces : mapping of str to float
@@ -676,9 +676,9 @@ def start_ranges(
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that makes full turns.
+    """Return the mean rate of each free coordinate, shape (free,): the crank's speed times the coordinate's ratio.
 
-    Under a torque the last component of ``guess`` gives the crank's speed.
+    Without a ratio the mean rate is 0. Under a torque the last component of ``guess`` gives the crank's speed.
     """
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)

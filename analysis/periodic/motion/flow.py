@@ -145,8 +145,8 @@ class Flow:
     size : int
         Number of components of y.
     swing_count : int
-        Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
-        crank's speed if there are none.
+        Number of components at the beginning of y whose amplitudes tell how the mechanism moves: the free coordinates, or
+        the crank's speed if there are none.
     rest : ndarray, shape (n,)
         y with the coordinates at which the mechanism starts by default, and rates of zero.
     angle_periods : ndarray, shape (n,)

@@ -447,7 +447,7 @@ def newton_orbit(
     ------
     OrbitError
         If no periodic motion is found; `OrbitAssemblyError` if the links come to the limit of assembly in the search.
-    InputError
+    InputError, ParameterError
         If an argument is not usable.
     """
     point = operating_point(parameters, drive)
@@ -745,7 +745,10 @@ class OrbitEquations:
         self._direction = family.direction(high, low, high) if first is last else None
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the scale of each unknown, its typical magnitude: the larger of the scales at the two ends of the range."""
+        """Return the scale of each unknown: the larger of its typical magnitudes at the two ends of the range.
+
+        The magnitudes of k pieces are multiplied by the square root of k, so that distances do not depend on k.
+        """
         scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
         # arc length is measured by the mean square over the pieces
         pieces = len(self.angles) - 1

@@ -114,9 +114,8 @@ def sweep(
     """Step through crank speeds as a machine does: each steady motion starts from the steady motion at the last speed.
 
     Under an induction motor the speeds are the synchronous speeds of its field, set by a frequency converter. If the last
-    motion is lost or unstable at the new speed, the mechanism is integrated for up to 5000 turns to the next steady motion: a
-    jump.
-    Rising and falling speeds may lead to different motions.
+    motion is lost or unstable at the new speed, the mechanism jumps: it is integrated for up to 5000 turns to the next steady
+    motion. Rising and falling speeds may lead to different motions.
 
     Parameters
     ----------
@@ -361,7 +360,7 @@ def find_orbit(
     ------
     OrbitError
         If no motion is found; `OrbitAssemblyError` if the links come to the limit of assembly in the search.
-    InputError
+    InputError, ParameterError
         If an argument is not usable.
 
     Examples
@@ -440,7 +439,7 @@ def find_orbits(
 
     Raises
     ------
-    InputError
+    InputError, ParameterError
         If an argument is not usable.
 
     Examples
@@ -466,10 +465,11 @@ def search_orbits(
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
-    """Find all periodic motions under a `Drive`: see `find_orbits`. The motions ``known`` are included in the result.
+    """Find all periodic motions under a `Drive`: see `find_orbits`.
 
-    Motions in which an undriven link goes round are sought, too: one link at a time, at most once per turn of the crank. If the
-    drive has a ratio for the link, only motions with this ratio are sought.
+    The motions ``known`` are included in the result, unless several numbers of turns are searched. Motions in which an undriven
+    link goes round are sought, too: one link at a time, at most once per turn of the crank. If the drive has a ratio for the
+    link, only motions with this ratio are sought.
     """
     if isinstance(turns, (list, tuple, range, set, np.ndarray)):
         numbers = sorted({Whole(least=1)(number, "turns") for number in turns})
@@ -639,8 +639,8 @@ def _reached_motion(
     The machine begins at ``start``, or is run up slowly, or else settles from ``near``. ``first`` is the motion that Newton's
     method found from the first guess, or None. If no motion is stable, or if a link may go round and no stable motion is near,
     ``first`` is returned. If no motion is stable and ``first`` is None, the result is the motion of the smallest amplitude.
-    Without damping the machine settles on no motion: ``first`` is returned if it is marginal, else the marginal motion of the
-    smallest amplitude.
+    If the machine settles on no motion, the result is the stable motion of the smallest amplitude. Without damping it settles
+    on none: ``first`` is returned if it is marginal, else the marginal motion of the smallest amplitude.
     """
     stable = found.stable
     if not stable:

@@ -303,7 +303,7 @@ def _resonances(arc: Arc, coordinate: int) -> list[Interval]:
     """Return the half-power bands of the peaks of a coordinate's amplitude along an arc, as ranges of the parameter.
 
     An end of the arc at which the branch continues on another arc also counts as a peak if the amplitude is greatest at this
-    end, or just before it, as beside a fold.
+    end, or just before it, as beside a fold, and falls to half power on the arc; but not for a period of several turns.
     """
     a = arc.amplitudes[:, coordinate]
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]

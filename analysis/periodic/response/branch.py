@@ -490,7 +490,7 @@ def _shift(orbit: PeriodicOrbit, turns: int, scale: NDArray[np.float64]) -> NDAr
 
 
 def _repeats_early(orbit: PeriodicOrbit) -> bool:
-    """Return whether a motion repeats itself after a whole part of its period already, and so belongs to another branch."""
+    """Return whether a motion repeats itself after a fraction of its period, 1 / `_PARTS`, and so belongs to another branch."""
     try:
         return any(
             orbit.turns % part == 0 and np.abs(_shift(orbit, orbit.turns // part, orbit.scale)).max() < _REPEATED

@@ -76,13 +76,17 @@ def free_position_name(mechanism: Mechanism, stiffness: str) -> str:
 
 @takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
-    """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
+    """Return the effective mass of the first degree of freedom that is not a crank, averaged over a crank turn.
+
+    The unit is kg, for an angle kg.m2.
 
     This degree of freedom is held where its spring exerts no force, or at 0 if `stiffness_name` finds no spring. For a five-bar
     the result is the mean of m22.
 
     Raises
     ------
+    ParameterError, InputError
+        If there is no such degree of freedom, or no crank.
     AssemblyError
         If the links cannot be joined over the whole turn with this degree of freedom held.
     """
@@ -314,8 +318,8 @@ def frequency_response(
     ------
     OrbitError
         If no periodic motion is found at either end of the range.
-    InputError
-        If the range is not finite and increasing.
+    InputError, ParameterError
+        If the range is not finite and increasing, or another argument is not usable.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 
@@ -593,7 +597,7 @@ def with_isolas(
 
     Raises
     ------
-    InputError
+    InputError, ParameterError
         If ``response`` is not a `Response`, or ``places`` or ``turns`` is less than one.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.

@@ -279,8 +279,9 @@ def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
 class FormRun:
     """A run near a period doubling, torus point or branch point, on the side where the motion of the branch is unstable.
 
-    ``distance`` is the greatest distance from the motion of the branch over the last periods, relative to the scale of y, and
-    infinite if the run ended early; ``expected`` is the distance that the normal form predicts for a supercritical point.
+    ``parameter`` is the value of the branch's parameter in the run. ``distance`` is the greatest distance from the motion of
+    the branch over the last periods, relative to the scale of y, and infinite if the run ended early; ``expected`` is the
+    distance that the normal form predicts for a supercritical point.
     """
 
     parameter: float
@@ -403,7 +404,7 @@ class Confirmation:
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
 #: Size below which a deviation counts as zero.
 TINY = 1e-300
-#: Least and greatest number of turns of a run.
+#: Least and greatest number of turns of a run whose number of turns is not given.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
 #: Factor of growth or decay of the deviation over a run above which the deviation counts as growing or decaying.
 NOTABLE = 3.0

@@ -5,8 +5,8 @@ d' = A d + r of a deviation d are solved at Gauss points for any number of right
 method of these points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The
 panels are joined by the condition that the solution is periodic; this works for unstable motions, too. The motion itself is
 sampled from the orbit. `motion.collocation` solves for the motion; the equations here, in contrast, allow any forcing r,
-friction and torques. The derivatives A of the rates dy/dangle, their derivatives by the constants, and the second derivatives
-along a direction are traced from the equations.
+friction and torques. The derivatives A of the rates dy/dangle with respect to y, those with respect to the constants, and the
+second derivatives along a direction are traced from the equations.
 """
 
 from __future__ import annotations
@@ -370,7 +370,7 @@ class Variations:
         return self._call("outputs", len(self.flow.mechanism.output_names))
 
     def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of output ``number`` at the nodes of a panel.
+        """Return the derivatives of the output with the index ``number`` at the nodes of a panel.
 
         The derivatives are with respect to y, shape (s, n), and to the drive vector and the constants, shape (s, c).
         """
@@ -477,7 +477,7 @@ def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
 
 @cache
 def _angle_derivatives(flow: Flow, switched: bool) -> Any:
-    """Return the function that gives the derivatives of the rates by the angle."""
+    """Return the function that gives the derivatives of the rates with respect to the crank angle."""
     s = _symbols(flow, switched)
     return _make_function(s, symbolic.library().jacobian(s.rates, s.angle))
 
