@@ -1,7 +1,7 @@
 """The ``linkwork`` command.
 
 Exit codes: 0 done; 1 an input was wrong (a message says which); 2 the command line was wrong; 3 a run ended early (the data so
-far are kept); 4 a check failed; 130 interrupted from the keyboard (the results so far are kept).
+far are kept), or a result is incomplete; 4 a check failed; 130 interrupted from the keyboard (the results so far are kept).
 """
 
 from __future__ import annotations

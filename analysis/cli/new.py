@@ -1,4 +1,4 @@
-"""`linkwork new`: write a case file to start from; the code that reads the file gives its entries, so that none is missing."""
+"""`linkwork new`: write a case file to start from. The entries are taken from the code that reads such a file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _TASKS: Mapping[str, Mapping[str, Any]] = {
     "precision-points": {"points": [[0, 0], [20, 15], [40, 20], [60, 15], [80, 0]], "unit": "mm"},
 }
 _CONSTRAINTS: Mapping[str, Any] = {"largest_link": "1 m", "least_transmission_angle": "30 deg"}
-#: Example entries of tables whose readers depend on the task.
+#: Examples of entries that have no default, or none that shows their use, by table.
 _REQUIRED: Mapping[str, Mapping[str, Any]] = {
     "trade_off": {"over": "size", "limits": ["50 cm", "1 m"]},
     "strategy": {"tolerance": "1 deg"},

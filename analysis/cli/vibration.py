@@ -18,8 +18,8 @@ from . import common
 from .driven import CaseChoice, add_case_options, swing_unit
 from .sensitivity import report_sensitivity
 
-#: Default range of speeds relative to the least and to the greatest natural frequency; it contains 2, near which parametric
-#: resonance begins.
+#: Ends of the default range of speeds: multiples of the least and of the greatest natural frequency. The range contains twice
+#: the natural frequency, near which parametric resonance begins.
 _RANGE = (0.15, 2.3)
 #: Greatest difference, relative to their scale, of two starts that count as the same motion.
 _SAME_MOTION = 1e-3
@@ -295,7 +295,10 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 
 def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
-    """Print the ranges to avoid, of the speed or another parameter, and the jumps at folds."""
+    """Print the ranges to avoid, of the speed or another parameter, and the jumps at folds.
+
+    The parameter is printed in ``unit``; ``factor`` is the factor from SI to it.
+    """
     from ..periodic import greatest_amplitudes
 
     ranges = response.speeds_to_avoid

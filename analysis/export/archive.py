@@ -135,7 +135,7 @@ assert len(result) == 21, len(result)
 
 
 def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
-    """Run the FMU with FMPy in a separate process, by default in twenty steps to 20 ms or to the end of one of its experiments.
+    """Run the FMU with FMPy in a separate process, by default in twenty steps to 20 ms or, if earlier, an experiment's end.
 
     Parameters
     ----------

@@ -59,6 +59,8 @@ def build_all(
         If there is no such model, kind or platform; raised before anything is built.
     BuildError
         If an FMU cannot be built, is not valid or does not run.
+    MissingLibraryError
+        If Zig is not installed, or wasmtime, which `WASM` needs.
     """
     known = {mechanism.fmu: mechanism for mechanism in MECHANISMS.values()}
     for what, names, there in (

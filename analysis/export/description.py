@@ -380,7 +380,7 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
 # Terminals and icons of FMI 3.0; a terminal groups the variables that a tool connects by one line
 
 
-#: Size of an icon (pixels), and of the drawing that terminals are placed in.
+#: Width of an icon (pixels), and half the width of the drawing in which terminals are placed.
 _PIXELS, _SIZE = 32, 100
 #: Icons of terminals (a shaft, a slider, a loaded point): whether the point (x, y) in [-1, 1] is black.
 _ICONS: Mapping[str, Callable[[float, float], bool]] = {

@@ -122,8 +122,10 @@ def build_native(
     Raises
     ------
     BuildError
-        If Zig is not installed, a file does not compile, the FMU is not valid, or `WASM` is asked for with FMI 2.0.
-    InputError
+        If a file does not compile, the FMU is not valid, or `WASM` is asked for with FMI 2.0.
+    MissingLibraryError
+        If Zig is not installed, or wasmtime, which `WASM` needs.
+    UnknownNameError
         If there is no such platform.
     MechanismError
         If the parts of the mechanism do not fit together.
@@ -191,8 +193,8 @@ def compile_binaries(
 ) -> dict[str, bytes]:
     """Compile the library for each platform; return the libraries by path in the archive.
 
-    The libraries for two architectures of macOS are in one file. If ``kept`` is true, a library that was compiled before
-    is not compiled again; see `compile_library`.
+    In FMI 2.0 the libraries for both architectures of macOS are in one file. If ``kept`` is true, a library that was compiled
+    before is not compiled again; see `compile_library`.
     """
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:

@@ -233,8 +233,8 @@ _OPTIONS = {
 def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
     """Put the guard in the place of PythonFMU's libraries, which are renamed; return all files by path.
 
-    The source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the master
-    gives.
+    The guard is a C library that the master calls; it calls PythonFMU's library and corrects its errors. Its source is added,
+    and a file with the FMU's GUID, which the guard compares with the GUID that the master gives.
 
     Parameters
     ----------

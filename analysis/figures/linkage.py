@@ -258,7 +258,7 @@ def animate_linkage(
     frames_per_second: int = 20,
     title: str = "",
 ) -> Path:
-    """Write a GIF of a run: the moving linkage with the trace of P, and beside it the slider position over time.
+    """Write a GIF of a run: the moving linkage with the trace of P, and below it the slider position over time.
 
     Parameters
     ----------

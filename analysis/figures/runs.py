@@ -56,8 +56,8 @@ def plot_outputs(run: Trajectory, names: Sequence[str] | None = None, *, title: 
     ----------
     run : Trajectory
     names : sequence of str, optional
-        Outputs to plot, one panel each, without the mechanism. By default coordinates, drives and magnitudes of the joint
-        forces are plotted; constant outputs are left out and stated at the foot.
+        Outputs to plot, one panel each, without the mechanism. By default these are plotted: the coordinates except the
+        crank's, crank speed, drives, transmission angles and magnitudes of joint forces. Constant ones are stated at the foot.
     title : str
     """
     require_list(names, "names")
@@ -115,7 +115,7 @@ def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: 
     runs : Ensemble
     names : sequence of str, optional
         Outputs to plot, one panel each; by default the first eight outputs that the ensemble was asked for
-        or, if it was asked for none, the coordinates.
+        or, if it was asked for none, the coordinates except the first, the crank's.
     title : str
     """
     require_list(names, "names")
@@ -282,7 +282,7 @@ def _is_constant(values: FloatArray) -> bool:
 
 
 def _mean_of_constant(values: FloatArray) -> float:
-    """Return the mean of a constant curve, and 0 if it is below the resolution."""
+    """Return the mean of a constant curve; 0 if its magnitude is at most `_STILL`, which is rounding."""
     mean = float(values.mean()) if len(values) else 0.0
     return mean if abs(mean) > _STILL else 0.0
 

@@ -152,9 +152,9 @@ def finish(figure: Figure, title: str = "", notes: Sequence[str] = ()) -> Figure
 
 
 def _has_cut_drawing(figure: Figure) -> bool:
-    """Return whether numbers or labels of axes to scale are at the edge of a figure.
+    """Return whether numbers or labels of a drawing to scale are at the left or lower edge of a figure.
 
-    Axes to scale are smaller than the place that a layout gives them; the next layout takes this into account.
+    The axes of such a drawing are smaller than the place that a layout gives them; the next layout takes this into account.
     """
     edge = _EDGE * figure.dpi
     drawings = [axis for axis in figure.axes if axis.axison and axis.get_aspect() != "auto"]

@@ -78,7 +78,8 @@ def _view_range(curves: Sequence[Curve]) -> tuple[float, float]:
 def _curves(survey: Survey, value: object, colour: str, width: float, name: str, scale: float) -> Iterator[Curve]:
     """Yield the curves of a quantity along the branches of a response, stable parts solid, unstable ones dashed.
 
-    ``value`` computes the quantity from a branch; only the first curve has the ``name`` in the legend.
+    ``value`` computes the quantity from a branch; only the first curve has the ``name`` in the legend. ``scale`` is the size of
+    the x axis's unit in SI.
     """
     for branch in survey.response.branches:
         stable = branch.largest_multiplier <= 1.0

@@ -96,6 +96,8 @@ def read_points(
         If no element of the SVG file has this ``id``.
     ParameterError
         If the unit is not of the kind of ``si``.
+    MissingLibraryError
+        If svgelements, which reads SVG, is not installed.
     """
     path = Path(path)
     ending = check_ending(path, (".csv", ".txt", ".svg"))

@@ -28,7 +28,7 @@ from .reader import unknown_name
 
 Point = tuple[float, float]
 
-#: Units of length, by their code in the DXF variable $INSUNITS.
+#: Units of length, each with its code in the DXF variable $INSUNITS.
 UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
 #: Units of length that SVG has.
 SVG_UNITS = ("mm", "cm", "in")
@@ -137,7 +137,8 @@ class Text(_Shape):
 class Dimension(_Shape):
     """The distance between two points (m), written on a line parallel to the line from ``start`` to ``end``.
 
-    ``offset`` is the distance (m) between these lines, positive to the left as seen from ``start`` to ``end``.
+    ``offset`` is the distance (m) between these lines, positive to the left as seen from ``start`` to ``end``. ``height`` (m)
+    is the height of the number and the length of the arrows.
     """
 
     start: Point
@@ -190,7 +191,7 @@ class Drawing:
     Raises
     ------
     InputError
-        If there is no shape, all shapes are at one point, or the title is not one printable line.
+        If there is no line, circle or polyline, all shapes are at one point, or the title is not one printable line.
     UnknownNameError
         If the layer of a shape is not in ``layers``.
     """

@@ -249,7 +249,8 @@ def design_lqr(
     r : float
         Weight of the force.
     integral : float
-        Weight of the integral of the coordinate (1/s2); if the weight is above zero, the law has integral action.
+        Weight of the integral of the coordinate, in the unit of the coordinate's weight over s2; if it is above zero, the law
+        has integral action.
     channel : str, optional
         FMI name of the force; by default the force on the last degree of freedom that is not commanded:
         see `LinearModel.force_channel`.

@@ -163,7 +163,7 @@ class Equilibrium:
 
 
 class _Balance:
-    """Equilibrium equations: generalised forces on the free degrees of freedom, divided by the mechanism's scales.
+    """Equilibrium equations: generalised forces on the free degrees of freedom, times the scales of their coordinates (N.m).
 
     In ``modes`` held degrees of freedom count as free, with no applied force: the unbalanced forces on them are the holding
     forces.
@@ -270,7 +270,10 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return starts of Newton's method: local minima of the imbalance on a grid, and its least values at some angles."""
+        """Return points of a grid from which Newton's method starts, as arrays of all coordinates.
+
+        They are the local minima of the imbalance and, at some angles of the cyclic freedoms, the point of least imbalance.
+        """
         from scipy.ndimage import minimum_filter  # takes a quarter of a second
 
         units = {variable.name: variable.unit for variable in self.mechanism.variables}
@@ -335,8 +338,8 @@ def find_equilibria(
     Returns
     -------
     tuple of Equilibrium
-        The equilibria, with angles of cyclic degrees of freedom in (-pi, pi]. If they are not isolated, only some of them are
-        found.
+        The equilibria; the coordinate of a free cyclic degree of freedom is within half its period of zero, usually in
+        (-pi, pi]. If the equilibria are not isolated, only some of them are found.
 
     Raises
     ------

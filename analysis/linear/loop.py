@@ -453,7 +453,7 @@ def control_loop(
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
-    """Return the largest difference (m) between the controlled coordinates of two runs of the same length."""
+    """Return the largest difference (m, or rad for an angle) between the controlled coordinates of two runs of one length."""
     if first.time.shape != second.time.shape:
         raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: both must have the same number")
     return float(np.abs(first.position - second.position).max())

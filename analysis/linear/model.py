@@ -349,7 +349,7 @@ def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
 
 
 def vibration_grows(poles: NDArray[np.complex128]) -> Any:
-    """Return whether the real part of a pole, along the last axis, is positive, apart from rounding."""
+    """Return for each set of poles along the last axis whether any has a positive real part, apart from rounding."""
     return poles.real.max(axis=-1) > ROUNDING * np.abs(poles).max(axis=-1)
 
 

@@ -203,7 +203,7 @@ class Builder:
         section : mapping, optional
             Cross-section from which mass, centre of mass and inertia are computed: a ``material`` and a ``kind``, which is
             ``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``, ``"tube"`` with ``outer`` and ``inner``, or
-            ``"plate"`` with ``thickness`` and ``corners``.
+            ``"plate"`` with ``thickness`` and ``corners``. All but a plate may have an ``overhang`` beyond each pin.
         """
         return self._add(
             "bodies", name, bar=bar, length=length, points=points, mass=mass, cog=cog, inertia=inertia, section=section

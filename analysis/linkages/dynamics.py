@@ -37,7 +37,7 @@ class Motion:
         self.counted, self.centred = counted, interface.centred_springs(counted)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
-        #: steps with racks, in the order in which their forces are computed
+        #: steps with gears, and steps with racks, in the order in which their forces are computed
         steps = self.structure.steps[::-1]
         self.geared = [step for step in steps if isinstance(step, GearStep)]
         self.racked = [step for step in steps if isinstance(step, RackStep)]

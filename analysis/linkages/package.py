@@ -200,7 +200,7 @@ class Package:
         Raises
         ------
         LinkageError
-            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the same name.
+            If the linkage cannot be assembled or moved at its start, or another mechanism has its name, or that of its FMU.
         """
         name = self.description.name
         known = MECHANISMS.get(name)

@@ -18,7 +18,11 @@ from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Slider, Struc
 
 
 class Parameter(NamedTuple):
-    """A parameter: FMI name, unit, meaning, value, and rule: ``positive``, ``free`` (any sign), ``sign`` (+1, -1) or none."""
+    """A parameter of a linkage: FMI name, unit, meaning and value.
+
+    ``rule`` is ``positive``, ``free`` (any sign), ``sign`` (+1 or -1), or empty for a value that must not be negative. ``role``
+    and ``of`` are those of the parameter's `Variable`: ``of`` is the coordinate on which a stiffness or damping acts.
+    """
 
     name: str
     unit: str

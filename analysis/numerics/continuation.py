@@ -317,7 +317,8 @@ class Follower:
     ) -> Curve:
         """Follow the curve until it reaches an end of the range, comes back to its first point or cannot be continued.
 
-        ``watch`` receives every point; ``leave`` returns a reason to stop at a point, or an empty text.
+        It also ends after ``most_points`` of the `Settings`. ``watch`` receives every new point; ``leave`` returns a reason to
+        stop at a new point, or an empty text.
         """
         settings = self.settings
         points, steps = [first], list[float]()
