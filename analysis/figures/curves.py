@@ -145,7 +145,7 @@ class Picture:
     notes : sequence of str
         Sentences at the foot.
     heights : sequence of float
-        Heights of the rows relative to ``size``; the rows then share one x axis. Empty for rows of equal height.
+        Heights of the rows relative to the height in ``size``; the rows then share one x axis. Empty for rows of equal height.
     """
 
     parts: Sequence[Any]

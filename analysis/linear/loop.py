@@ -117,7 +117,7 @@ class SampledController:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMetrics:
-    """Settling, overshoot, tracking error and force of a closed loop.
+    """Settling, overshoot, tracking error and force of a closed loop; units are for a position and a force.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class LoopResult:
     states : ndarray, shape (n, 2 f)
         All coordinates, then all rates: for a five-bar (th2, u, th2', u').
     force, reference : ndarray, shape (n,)
-        Force (N) and reference (m); each value holds until the next sample.
+        Force (N, or N.m on an angle) and reference (in ``unit``); each value holds until the next sample.
     freedom : int
         Index of the controlled degree of freedom; by default the last.
     unit : str
@@ -177,7 +177,7 @@ class LoopResult:
 
     @property
     def position(self) -> FloatArray:
-        """Controlled coordinate (m) at the sampling times, shape (n,)."""
+        """Controlled coordinate (in ``unit``) at the sampling times, shape (n,)."""
         return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
 
     @in_si(window="s")

@@ -141,7 +141,8 @@ class DeadCentre(NamedTuple):
 def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list[DeadCentre]:
     """Find the positions of a freedom at which a body that is pinned to the ground, or slides on it, stands still.
 
-    The other freedoms are at their start. At such a position the velocity coefficient of the body changes its sign.
+    The other freedoms are at their start. At such a position the velocity coefficient of the body changes its sign; this is
+    sought in ``samples`` equal intervals of the range.
     """
     made, joints = package.mechanism(), package.structure.joints.values()
     # a spring about its pin counts the turns of a crank, but the bodies are back after one

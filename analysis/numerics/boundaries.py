@@ -122,7 +122,8 @@ def find_minimum(
 ) -> tuple[float, float]:
     """Find the minimum of a smooth function on an interval; return its argument and its value.
 
-    The error of the argument is ``tolerance`` times the length of the interval; the error of the value is of second order.
+    The minimum is refined near the least of ``samples`` values. The error of the argument is ``tolerance`` times the length of
+    the interval; the error of the value is of second order.
 
     Raises
     ------
