@@ -388,7 +388,7 @@ def _step() -> Iterator[Statement]:
     yield statement(
         "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
         "A^-1 V].",
-        "section 2.6.1, eq 23a, L457-463",
+        "section 2.6.1, eq 23a, L459-463",
         "greatest difference of Delta by eq 23a from A^-1 V, with A^-1 (by L457 the pseudo-inverse) from singular values, "
         f"over the first corrections of a turn; {OPEN[0].name}, lengths in inches",
         ROUNDING,

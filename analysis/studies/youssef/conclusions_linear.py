@@ -117,7 +117,7 @@ def judge_introduction() -> Iterator[Statement]:
         "8.0, L6057",
         "for the resonance, the difference of the amplitude from that of a single mass, as at L7102. For the stability, as "
         "at L7116: speed in the middle of the region near twice the natural frequency, relative to this frequency, and "
-        "width of the region at the natural frequency",
+        "width of the region at the natural frequency, relative to that of this region",
         f"{ABOUT:g}, the rule for *similar*; {OF_REGION}",
         *judge_oscillator("near half the natural frequency the second harmonic has its own resonance"),
         *judge_single_region(),
