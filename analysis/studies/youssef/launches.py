@@ -467,8 +467,8 @@ def launch_positions_by_spring() -> StudyResult:
             "which occurs a free motion steady state decay which is studied in the next section.",
             "3.2.2, L2195-2201",
             "distance of u from its steady decay, relative to the range of this decay in the turn, in the first turn after the "
-            "torque and in the last turn within 1 s, the latter to 1e-05, to which u of the decay is interpolated between its "
-            "turns. The decay is u of a free crank that is released from its steady motion at "
+            "torque and in the last turn within 1 s; the latter is rounded to 1e-05, the accuracy with which u of the decay is "
+            "interpolated between its turns. The decay is u of a free crank that is released from its steady motion at "
             f"{', '.join(f'{rpm:g}' for rpm in RELEASED.values())} rpm with the three springs (our choice). The two are "
             "compared at equal crank angles, in turns of equal mean speed; where the launched crank is faster, with the "
             "fastest turn of the released one. Then the mean of u relative to the turn before, once u is within "
