@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import degrees
-
 import numpy as np
 
 from ..display import format_turns
@@ -103,14 +101,13 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
 
     The coordinate is the first that is not commanded.
     """
-    curves, label, longest = [], "first free coordinate", 0.0
+    curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)
         variable = next(v for v in find_mechanism(orbit.parameters).variables if v.name == turn.swings[0])
         unit, factor = display_unit(variable)
         label = f"{name_in_words(turn.swings[0])} [{unit}]"
         stable = orbit in found.stable
-        longest = max(longest, degrees(orbit.flow.period * orbit.turns))
         curves.append(
             Curve(
                 x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
@@ -123,5 +120,5 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
         orbit = found.orbits[0]
         speed = orbit.flow.period * orbit.turns / orbit.turn(2).period / RAD_S_PER_RPM
         title = f"Periodic motions found at {speed:.5g} rpm"
-    ticks = np.linspace(0.0, longest, 5).tolist() if curves else None
+    ticks = np.linspace(0.0, np.max([curve.x for curve in curves]), 5).tolist() if curves else None
     return plot_curves([Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks)], title=title)

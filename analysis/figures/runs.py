@@ -182,7 +182,7 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
     A curve that varies by rounding only is drawn as constant, and a single sample as a point.
     """
     if not is_fast(values):
-        axis.plot(time, without_rounding(values), line, marker="o" if len(values) == 1 else None, label=label or None)
+        axis.plot(time, _without_rounding(values), line, marker="o" if len(values) == 1 else None, label=label or None)
         return
     parts = np.array_split(np.arange(len(values)), min(_BANDS, _oscillations(values) // 2))
     middle = np.array([time[part].mean() for part in parts])
@@ -197,7 +197,7 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
 
 def is_fast(values: FloatArray) -> bool:
     """Return whether a curve oscillates so often that a panel would show a block of colour."""
-    return _oscillations(without_rounding(values)) > _FAST
+    return not _is_constant(values) and _oscillations(values) > _FAST
 
 
 def _oscillations(values: FloatArray) -> int:
@@ -287,7 +287,7 @@ def _mean_of_constant(values: FloatArray) -> float:
     return mean if abs(mean) > _STILL else 0.0
 
 
-def without_rounding(values: FloatArray) -> FloatArray:
+def _without_rounding(values: FloatArray) -> FloatArray:
     """Return the values of a curve in display units; those of a constant curve are its mean, without rounding errors."""
     return np.full_like(values, _mean_of_constant(values)) if _is_constant(values) else values
 
@@ -327,7 +327,7 @@ def plot_comparison(
     rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
     for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
         for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
-            axes[0].plot(time, without_rounding(values), line, color=colour, label=label)
+            axes[0].plot(time, _without_rounding(values), line, color=colour, label=label)
         axes[0].set_ylabel(style.axis_label(name, unit))
         if beside:
             _draw_difference(axes[1], time, b - a, unit, size)

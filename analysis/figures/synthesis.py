@@ -225,8 +225,7 @@ def _plot_function(axis: Axes, scene: syn.LinkageScene) -> tuple[FloatArray, Flo
     look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": style.THIN}
     x = np.degrees(scene.stations["crank rotation [rad]"])
     axis.plot(x, factor * scene.stations[heading], "o", color=style.TARGET, label="target", zorder=5, **look)
-    style.tick_quarter_turns(axis, turns[0], turns[-1])
-    axis.set_xlabel("crank rotation [deg]")
+    _label_rotations(axis, turns)
     axis.set_ylabel(label)
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
     return turns, values
@@ -282,8 +281,7 @@ def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> tuple[FloatArray,
     axis.axhline(90.0, color="0.6", linewidth=style.HAIR)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
-    style.tick_quarter_turns(axis, turns[0], turns[-1])
-    axis.set_xlabel("crank rotation [deg]")
+    _label_rotations(axis, turns)
     axis.set_ylabel("transmission\nangle [deg]")
     return turns, angles
 
@@ -295,9 +293,14 @@ def _plot_pivot_motion(axis: Axes, scene: syn.LinkageScene) -> None:
     unit, factor = display_scale("m" if name.endswith("[m]") else "rad")
     turns = np.degrees(scene.transmission[0])
     axis.plot(turns, factor * values, color=style.SLIDER)
+    _label_rotations(axis, turns)
+    axis.set_ylabel(f"{name.partition('[')[0]}[{unit}]".replace(" ", "\n", 1))
+
+
+def _label_rotations(axis: Axes, turns: FloatArray) -> None:
+    """Put the ticks of the x axis at quarter turns of the crank, and name the axis; ``turns`` are its rotations (deg)."""
     style.tick_quarter_turns(axis, turns[0], turns[-1])
     axis.set_xlabel("crank rotation [deg]")
-    axis.set_ylabel(f"{name.partition('[')[0]}[{unit}]".replace(" ", "\n", 1))
 
 
 def _draw_panel(axis: Axes, scene: syn.LinkageScene, *, size: float, letters: bool = True) -> None:
@@ -395,8 +398,7 @@ def _plot_forces(axis: Axes, forces: syn.PinForces, last: str) -> None:
     """Plot the resultant force on each pin over the crank rotation; ``last`` labels the fourth force: D or the guide."""
     for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, style.COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
-    style.tick_quarter_turns(axis, *np.degrees(forces.rotation[[0, -1]]))
-    axis.set_xlabel("crank rotation [deg]")
+    _label_rotations(axis, np.degrees(forces.rotation))
     axis.set_ylabel("pin force [N]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, borderpad=0.2, columnspacing=1.0)
 

@@ -29,7 +29,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import Parameters, find_mechanism
 from ..numerics import symbolic
-from ..run import Inputs, check_run, encode, expressions, float_array, law_slopes, sample, takes_published
+from ..run import Inputs, check_run, encode_once, expressions, float_array, law_slopes, sample, takes_published
 
 if TYPE_CHECKING:
     import control
@@ -68,6 +68,7 @@ class Layout:
     forces: tuple[int, ...]  # indices of the channels whose forces act
     input_names: tuple[str, ...]  # the forces, then acceleration, speed and coordinate of each commanded one
     state_names: tuple[str, ...]  # the free coordinates, then their rates
+    places: tuple[int, ...]  # indices of these in the plant's state
 
 
 @cache
@@ -95,7 +96,10 @@ def layout(mechanism: Mechanism, modes: Modes) -> Layout:
         inputs.append(mechanism.freedoms[n].coordinate)
     moving = [mechanism.freedoms[n] for n in free]
     states = tuple([f.coordinate for f in moving] + [f.rate for f in moving])
-    return Layout(free=free, commanded=commanded, forces=forces, input_names=tuple(inputs), state_names=states)
+    places = (*free, *(len(freedoms) + n for n in free))
+    return Layout(
+        free=free, commanded=commanded, forces=forces, input_names=tuple(inputs), state_names=states, places=places
+    )
 
 
 def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
@@ -227,8 +231,7 @@ class Matrices:
     @property
     def places(self) -> list[int]:
         """Indices of the components of (q, q') in the plant's state."""
-        free, n = self.layout.free, len(self.mechanism.freedoms)
-        return [*free, *(n + k for k in free)]
+        return list(self.layout.places)
 
     @property
     def A(self) -> FloatArray:
@@ -400,10 +403,9 @@ def evaluate(
     arrays = dict(zip(order, map(stack, raw, (1, 1, size, size, size, acting, 2 * size, acting))))
     for name in ("outputs", "acceleration"):
         arrays[name] = arrays[name][:, :, 0]
-    places = [*its.free, *(len(mechanism.freedoms) + k for k in its.free)]
-    for channel, place, slope in law_slopes(encode(inputs or Inputs(), mechanism), states):
-        if channel in its.forces and place in places:
-            state, column = places.index(place), its.forces.index(channel)
+    for channel, place, slope in law_slopes(encode_once(inputs, mechanism), states) if inputs else ():
+        if channel in its.forces and place in its.places:
+            state, column = its.places.index(place), its.forces.index(channel)
             arrays["CK"[state < size]][:, :, state % size] -= slope[:, None] * arrays["F"][:, :, column]
             arrays["H"][:, :, state] += slope[:, None] * arrays["D"][:, :, column]
     # adding 0.0 changes -0.0 to 0.0
@@ -434,7 +436,7 @@ def sample_channels(
     differs from the rate in a state.
     """
     inputs, _ = check_run(mechanism, inputs, None)
-    encoded = encode(inputs, mechanism)
+    encoded = encode_once(inputs, mechanism)
     for row in states:
         if not np.all(np.isfinite(row)):
             raise InputError(f"the state {row} is not finite")

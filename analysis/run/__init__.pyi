@@ -68,6 +68,7 @@ from .inputs import Inputs as Inputs
 from .inputs import align as align
 from .inputs import check_run as check_run
 from .inputs import encode as encode
+from .inputs import encode_once as encode_once
 from .inputs import speed_ratio as speed_ratio
 from .inputs import start_ratio as start_ratio
 from .masses import Mass as Mass
